@@ -1,13 +1,18 @@
-"""A long log in the studio, in a real browser: seconds to the first word of progress and to the first picture, pans.
+"""The studio in a real browser: a long log, and from an empty page to a fitted robot.
+
+Of the log: seconds to the first word of progress and to the first picture, and how often a second it is drawn in a pan.
+Of the robot: clicks and seconds with the example log, where nothing is compiled and where all is.
 
 Needs Chromium and playwright, as the tests of the studio do: see tests/studio/conftest.py.
 """
 
 from __future__ import annotations
 
+import os
 import tempfile
 import time
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 
@@ -19,6 +24,8 @@ ROWS, STEP = scaled(3_600_000, 100_000), 0.001  # [s]
 SIGNALS = ("u1_V", "u2_V", "u3_V", "vx_m_s", "vy_m_s", "omega_rad_s")
 PICTURE_GOAL_S = {"parquet": 8.0, "csv": 20.0}
 PROGRESS_GOAL_S, PAN_GOAL_HZ = 1.0, 25.0
+CLICKS = ("#example", "role=tab[name='Fit']", "#fit:not([disabled])")
+CLICK_GOAL = 9
 PANS = """() => new Promise(done => {
     const plot = document.querySelector('omni-plot'), whole = plot.meta.end - plot.meta.begin;
     plot.look(plot.meta.begin, plot.meta.begin + whole / 2);
@@ -48,10 +55,34 @@ def measure() -> Table:
     table.notes.append(machine())
     table.notes.append("progress, picture, checked: from the moment when the file is given; pans: half of the log wide")
     with tempfile.TemporaryDirectory(prefix="omnidyn-studio-log-") as folder, launched() as browser:
+        with patch.dict(os.environ, NUMBA_CACHE_DIR=str(Path(folder) / "compiled")):
+            for state in ("nothing compiled", "compiled by it"):
+                table.notes.append(_first_fit(browser, state))
         for path in _written(Path(folder)):
             for given in ("dropped", "named"):
                 _add(table, browser, path, given)
     return table
+
+
+def _first_fit(browser, state: str) -> str:
+    """From an empty page to a fitted robot, in words."""
+    with running() as studio:
+        page = browser.new_page()
+        page.set_default_timeout(300_000)
+        page.goto(studio.address)
+        page.wait_for_selector("#example")
+        begun = time.monotonic()
+        for click in CLICKS:
+            page.click(click)
+        asked = time.monotonic()
+        page.wait_for_selector("#fit-verdict")
+        done = time.monotonic()
+        page.close()
+    met = "pass" if len(CLICKS) <= CLICK_GOAL else "MISS"
+    return (
+        f"example log to fitted robot, {state}: {len(CLICKS)} clicks (at most {CLICK_GOAL}: {met}), "
+        f"{done - begun:.1f} s, {done - asked:.1f} s of them after the last click"
+    )
 
 
 def _written(folder: Path) -> list[Path]:

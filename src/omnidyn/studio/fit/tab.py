@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 from nicegui import ui
 
+from omnidyn.cli.terminal.sizes import ROBOT as ROBOT_SIZE
+from omnidyn.cli.terminal.sizes import WHEEL
 from omnidyn.studio.elements import plot, table, verdict
 from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.page import Page
@@ -18,6 +20,11 @@ WHY = {
     "nothing_free": "Nothing is free: choose what to fit.",
     "all_held_out": "Every log is held out: leave one to fit.",
 }
+
+
+def _range(limits: tuple[float, float]) -> str:
+    """What robots have."""
+    return f"{limits[0]:g} to {limits[1]:g}"
 
 
 class FitTab:
@@ -36,20 +43,37 @@ class FitTab:
         self.page.part(self._result, FIT)
 
     def _robot_form(self) -> None:
+        """What `init` asks for, within what robots have, and the robot as it is described."""
         fields = {
-            "--azimuth": ("wheels stand at [degree]", "60,180,300"),
-            "--wheel-radius": ("radius of a wheel [m]", "0.05"),
-            "--robot-radius": ("centre to wheel [m]", "0.15"),
-            "--mass": ("mass [kg]", "3"),
-            "--voltage-limit": ("voltage limit [V]", ""),
+            "--azimuth": ("wheels stand at [degree]", "60,180,300", "0 is forward, 90 left"),
+            "--wheel-radius": ("radius of a wheel [m]", "0.05", _range(WHEEL)),
+            "--robot-radius": ("centre to wheel [m]", "0.15", _range(ROBOT_SIZE)),
+            "--mass": ("mass [kg]", "3", ""),
+            "--voltage-limit": ("voltage limit [V]", "", "a guess where it is empty"),
+            "--gear-ratio": ("gear ratio [1]", "", "a guess where it is empty"),
         }
-        with ui.row().classes("line"):
-            name = ui.input("name", value="my-robot")
-            inputs = {flag: ui.input(words, value=value) for flag, (words, value) in fields.items()}
+        with ui.element("div").classes("form"):
+            with ui.row().classes("line"):
+                name = ui.input("name", value="my-robot")
+                inputs = {
+                    flag: ui.input(words, value=value).props(f"hint='{hint}'")
+                    for flag, (words, value, hint) in fields.items()
+                }
+            picture = ui.element("omni-robot")
+        drawn = ("--azimuth", "--wheel-radius", "--robot-radius")
+
+        def draw() -> None:
+            for flag in drawn:
+                picture._props[f"data{flag[1:]}"] = str(inputs[flag].value or "")
+            picture.update()
+
+        draw()
+        for flag in drawn:
+            inputs[flag].on_value_change(draw)
         trouble = ui.label().classes("text error-text")
 
         async def make() -> None:
-            options = [f"{flag}={field.value}" for flag, field in inputs.items() if str(field.value).strip()]
+            options = [f"{flag}={field.value}" for flag, field in inputs.items() if str(field.value or "").strip()]
             trouble.text = await self.session.make_robot(name.value or "", options)
 
         ui.button("Make this robot", on_click=make).props("outline no-caps id=make-robot")
