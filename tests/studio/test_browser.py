@@ -216,7 +216,28 @@ def test_the_dead_zone_is_felt_and_the_drive_is_fitted(browser, tmp_path):
     page.wait_for_function(f"{still} === 'true'")
     slide(page, "friction.axes.coulomb[0]", 3.3)
     set_level = float(page.input_value("input[name='friction.axes.coulomb[0]']"))
+    rough = Key.parse("friction.axes.coulomb[0]").set(omnidyn.load_robot("axebot"), set_level)
+    omnidyn.save_robot(rough, tmp_path / "rough.toml")
+    axes = command("deadzone", tmp_path / "rough.toml", "--json")[0]["dead_zone"]
+    page.wait_for_function(
+        f"document.querySelector('#breakaway').innerText.includes('forward {axes[0]['breakaway_scale_V']:.4g} V')"
+    )
+    pad = page.get_by_role("button", name="W forward").bounding_box()
+    page.mouse.move(pad["x"] + 5, pad["y"] + 5)
+    page.mouse.down()  # the button for a phone
+    page.wait_for_timeout(700)
+    assert page.evaluate(still) == "true"  # 0.8 V moved it before
     slide(page, "level", 5.0)
+    page.wait_for_function(f"{still} === 'false'")
+    page.mouse.up()
+    page.wait_for_function(f"{still} === 'true'")
+    for _ in range(3):
+        page.get_by_label("more: load").press("Enter")
+    load = float(page.input_value("input[name=payload]"))
+    mass = "document.querySelector('input[name=\"body.mass_kg\"]').parentElement.querySelector('output').innerText"
+    page.wait_for_function(f"{mass} === '{1.5 + load:.4g} kg'")
+    slide(page, "payload", 0.0)
+    page.wait_for_function(f"{mass} === '1.5 kg'")
     page.click("#record")
     for key in "wsadqewsadqe":
         page.keyboard.down(key)

@@ -3,9 +3,12 @@
 import asyncio
 import queue
 
+import numpy as np
 import pytest
 
 import omnidyn
+from omnidyn.model.friction import DirectionFriction, Friction
+from omnidyn.model.surroundings import Floor, Surface, Variations
 from omnidyn.studio.drive.job import Drive
 from omnidyn.studio.worker import CancelledError, JobError, Worker
 
@@ -53,9 +56,81 @@ def test_the_robot_rests_inside_its_dead_zone_and_goes_on_under_other_numbers(tm
     assert driven.robot.friction.axes.coulomb[0] == 3.3
 
 
+def test_floor_load_and_battery_change_under_a_robot_that_drives(tmp_path):
+    robot = omnidyn.load_robot("axebot")
+    full = {"axes": [1, 0, 0], "level": 6.0}
+    driven, (*_, free), before = drive(robot, tmp_path, full, steps=1)
+    _, (*_, loaded), told = drive(robot, tmp_path, full, {"vary": {"payload": 1.5}}, steps=1)
+    assert loaded[4] == pytest.approx(0.5 * free[4], rel=0.06)  # twice the mass of 1.5 kg, half the acceleration
+    assert [n["value"] for n in told["numbers"]["numbers"] if n["key"].startswith("body")] == [3.0, 0.025]
+    driven._take({"vary": {"floor": 2.0}})
+    assert driven.live.twist[0] == free[4]
+    assert driven.robot.friction.axes.coulomb == (4.4, 3.0, 0.198)
+    assert driven._numbers()["breakaway"] == pytest.approx([2.0 * volts for volts in before["robot"]["breakaway"]])
+    driven._take({"vary": {"floor": ""}})
+    assert driven.robot == robot
+    volts = before["robot"]["breakaway"][0]
+    _, low, _ = drive(robot, tmp_path, full, {"vary": {"battery": 0.99 * volts}})
+    assert low[-1][4] == 0.0
+    assert low[-1][11:14] == pytest.approx([0.0, 0.99 * volts, -0.99 * volts])  # no wheel gets more
+
+
+def test_floors_and_loads_of_the_robot_file_go_by_name(tmp_path):
+    robot = omnidyn.load_robot("axebot")
+    direction = DirectionFriction(coulomb=(3.0, 3.0), yaw_coulomb=0.1)
+    variations = Variations(
+        floor={"carpet": Surface(friction=Friction(direction=direction))}, tilt={"ramp": Floor(tilt=30.0)}
+    )
+    robot = robot.replace(variations=variations)
+    driven, _, told = drive(robot, tmp_path, {"vary": {"floor": "carpet"}})
+    assert told["robot"]["names"] == {"floor": ("carpet",), "tilt": ("ramp",)}
+    assert next(n["key"] for n in told["numbers"]["numbers"]) == "friction.direction.coulomb[0]"
+    assert driven.robot.friction.direction == direction
+    driven._take({"vary": {"tilt": "ramp"}})
+    assert driven._numbers()["breakaway"] == [None] * 3
+    driven._step()
+    braked = (19.0 * 0.0059 / 0.035) ** 2 / 1.69 * 1.5 / 1.5 / 60  # (l K_t / r)^2 / R of 1.5 wheels, over M, one step
+    speed = (9.81 * 0.5 - 3.0 / 1.5) / 60 * (1.0 - np.exp(-braked)) / braked  # g sin 30 - 3.0 N / 1.5 kg
+    assert driven.live.twist[0] == pytest.approx(speed, rel=1e-4)
+
+
+def test_friction_holds_at_rest_and_resists_in_motion(tmp_path):
+    robot = omnidyn.load_robot("axebot")
+    _, held, _ = drive(robot, tmp_path, {"axes": [1, 0, 0], "level": 0.5})
+    _, moving, _ = drive(robot, tmp_path, {"axes": [1, 0, 0], "level": 5.0})
+    push = 2 * 0.5 * np.sin(np.pi / 3) * 19.0 * 0.0059 / (1.69 * 0.035)  # two wheels, eqs (4), (10), (11) at rest
+    assert held[-1][8:11] == pytest.approx([-push, 0.0, 0.0], abs=1e-12)
+    assert moving[-1][8] == pytest.approx(-(2.2 + 0.94 * moving[-1][4]), rel=1e-9)  # Table 3
+
+
+def test_a_duty_is_recorded_with_its_battery(tmp_path):
+    robot = omnidyn.load_robot("axebot")
+    robot = robot.replace(drive=robot.drive.replace(kind="duty", supply=6.0))
+    driven, _, _ = drive(robot, tmp_path, {"record": True}, {"axes": [1, 0, 0], "level": 0.5}, steps=30)
+    driven._take({"vary": {"battery": 3.0}})
+    for _ in range(30):
+        driven._step()
+    driven._take({"record": False})
+    log = omnidyn.read_log(tmp_path / "drive-1.csv")
+    np.testing.assert_array_equal(log.supply, [6.0] * 30 + [3.0] * 30)
+    np.testing.assert_allclose(log.duty[-1], [0.0, 0.5, -0.5])
+
+
 def test_strange_commands_are_told_and_nothing_else_happens(tmp_path):
     robot = omnidyn.load_robot("axebot")
-    strange = ({"axes": "x", "level": 1}, {"set": {"__class__": 1}}, {"offset": [1]}, {"set": {"body.mass_kg": -1}})
+    strange = (
+        {"axes": "x", "level": 1},
+        {"set": {"__class__": 1}},
+        {"offset": [1]},
+        {"set": {"body.mass_kg": -1}},
+        {"vary": {"floor": "carpet"}},
+        {"vary": {"payload": -1}},
+        {"vary": {"body": 1}},
+        {"vary": [1]},
+        {"set": [1]},
+        {"axes": [float("nan"), 0, 0], "level": 1},
+        {"axes": [1, 0, 0], "level": float("inf"), "offset": [0, 0, 0]},
+    )
     for command in strange:
         driven, frames, others = drive(robot, tmp_path, command, steps=2)
         assert "trouble" in others, command

@@ -25,7 +25,7 @@ from omnidyn.arguments import check_order
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.layout import N_AXES, new_states
-from omnidyn.model.mass import masses_couple, per_mass
+from omnidyn.model.mass import mass_matrix, masses_couple, per_mass
 from omnidyn.model.motor import QUASI_STATIC, Motor, settled_current, traction
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
@@ -113,6 +113,15 @@ def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArr
     return (accelerations(numbers, moving_states(numbers, twists), volts) / [1.0, 1.0, numbers.body.length]).reshape(
         *batch, 3
     )
+
+
+def friction_wrench(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArray:
+    """Wrench of friction on the body [N, N, N m], eqs (4)-(6) solved for it: M a - G f - the turning frame's.
+
+    In motion it resists, at rest it balances what drives. Arguments, shapes and errors: `acceleration`.
+    """
+    total = np.asarray(acceleration(robot, twist, voltage) @ mass_matrix(robot), dtype=float)
+    return total - drive_wrench(robot, twist, voltage) - frame_wrench(robot, np.asarray(twist, dtype=float))
 
 
 def holds_under(robot: Robot) -> Callable[[FloatArray], BoolArray]:

@@ -14,10 +14,13 @@ import numpy as np
 
 from omnidyn.arguments import check_order
 from omnidyn.errors import InputError
+from omnidyn.model.friction import Friction
+from omnidyn.model.keys import BREAKAWAY, COULOMB, VISCOUS
 from omnidyn.model.log_effects import KeyCorrelation, key_correlation
 from omnidyn.model.robot import Prior, Robot
 from omnidyn.model.surroundings import KINDS, Battery, Floor, Payload, Surface
 
+LEVELS = (VISCOUS, COULOMB, BREAKAWAY)
 ON_FLOOR = ("axes", "direction")  # the parts of friction that a floor has; that at the wheels is of bearings and gears
 
 
@@ -62,6 +65,21 @@ def vary_robot(
         variations=original.variations.replace(**{k: {} for k in used_kinds}),
         priors={key: prior for key, prior in robot.priors.items() if not key.startswith(heads)},
     )
+
+
+def times_friction(robot: Robot, factor: float) -> Surface:
+    """The floor of a robot with so many times its friction: every level of [friction.axes] and [friction.direction].
+
+    Raises InputError for a factor below 0, or a level beyond any robot.
+    """
+    parts = {}
+    for part in ON_FLOOR:
+        law = getattr(robot.friction, part)
+        levels = {name: getattr(law, name) for name in type(law).model_fields if any(word in name for word in LEVELS)}
+        parts[part] = law.replace(
+            **{name: (factor * np.array(level)).tolist() for name, level in levels.items() if level is not None}
+        )
+    return Surface(friction=Friction(**parts))
 
 
 def vary_as(robot: Robot, text: str) -> Robot:

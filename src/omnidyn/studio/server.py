@@ -228,4 +228,4 @@ def _add_sockets(app: FastAPI, studio: Studio) -> None:
 def _take(driving: Driving, command: Any) -> None:
     """A command of a page, as far as it is one."""
     if isinstance(command, dict):
-        driving.send({name: command[name] for name in ("axes", "level", "offset", "set") if name in command})
+        driving.send({name: command[name] for name in ("axes", "level", "offset", "set", "vary") if name in command})

@@ -41,13 +41,13 @@ class Driving:
             if kind == "robot":
                 self.robot = value
                 self.session.changed(VIEW)
-            elif kind == "breakaway" and self.robot is not None:
-                self.robot["breakaway"] = value
+            elif kind == "numbers" and self.robot is not None:
+                self.robot |= value
             elif kind == "trouble":
                 self.trouble = value
             elif kind == "recorded":
                 self.session.add_log(value["path"], Path(value["path"]).name)
-            self.session.changed(NUMBERS if kind == "breakaway" else DRIVE)
+            self.session.changed(NUMBERS if kind == "numbers" else DRIVE)
 
         try:
             await self.session.workers["drive"].run(
@@ -65,10 +65,6 @@ class Driving:
         if self.running:
             if "record" in command:
                 self.recording = bool(command["record"])
-            for key, value in command.get("set", {}).items():
-                for number in (self.robot or {}).get("numbers", []):
-                    if number["key"] == key:
-                        number["value"] = value
             self.session.workers["drive"].send({"command": command})
             if "record" in command:
                 self.session.changed(DRIVE)

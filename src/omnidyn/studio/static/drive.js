@@ -2,7 +2,9 @@ import { LEFT, RIGHT, css, make, save, sharp, short, socketUrl, ticks } from './
 
 const KEYS = { w: [0, 1], s: [0, -1], a: [1, 1], d: [1, -1], q: [2, 1], e: [2, -1],
   ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [1, 1], ArrowRight: [1, -1] };
-const HEAD = 8, PER_WHEEL = 5, STRIP = 600; // numbers of a frame; frames of a strip
+const PADS = [['q', 'turn left'], ['w', 'forward'], ['e', 'turn right'], ['a', 'left'], ['s', 'back'], ['d', 'right']];
+const VARIED = { floor: ['floor: times the friction', ''], payload: ['load', 'kg'], tilt: ['slope', ''], battery: ['battery', 'V'] };
+const HEAD = 11, STRIP = 600; // numbers of a frame before those of the wheels; frames of a strip
 
 // The robot from above, driven by keys, sliders and a gamepad
 class Drive extends HTMLElement {
@@ -25,50 +27,92 @@ class Drive extends HTMLElement {
   static observedAttributes = ['data-robot'];
   attributeChangedCallback() {
     this.robot = JSON.parse(this.dataset.robot);
-    if (this.sliders) for (const number of this.robot.numbers) this.sliders[number.key]?.(number.value);
-    this.tell?.();
+    if (this.sliders) this.follow();
   }
   build() {
-    this.held = new Set(); this.trail = []; this.strip = []; this.offset = this.robot.azimuth.map(() => 0);
+    this.held = new Set(); this.trail = []; this.strip = []; this.offset = this.robot.wheels.map(() => 0);
     const stage = make('div', this, { className: 'stage' }), left = make('div', stage), right = make('div', stage);
     this.canvas = make('canvas', left, { tabIndex: 0 });
     this.canvas.setAttribute('role', 'img'); this.canvas.setAttribute('aria-label', 'The robot from above');
     this.state = make('div', left, { className: 'state' });
-    make('div', left, { className: 'tools', innerHTML: '<span><b>W S</b> forward, back</span><span><b>A D</b> left, right</span><span><b>Q E</b> turn</span>' });
+    this.pads(make('div', left, { className: 'pads' }));
     const unit = this.robot.unit;
     make('h3', right, { textContent: 'Keys' });
     this.level = this.slider(right, `level of a key`, unit, 0, this.robot.limit, Math.min(this.robot.limit, this.robot.limit / 2), () => this.send(), 'level');
     this.note = make('div', right, { className: 'state', id: 'breakaway' });
-    this.tell = () => {
-      const volts = this.robot.breakaway;
-      this.note.textContent = volts.every((v) => v === null) ? ''
-        : `moves from ${['forward', 'sideways', 'turning'].map((n, k) => `${n} ${volts[k] === null ? '-' : short(volts[k])} ${unit}`).join(', ')}`;
-    };
-    this.tell();
     make('h3', right, { textContent: 'Each wheel' });
-    this.robot.azimuth.forEach((_, k) => this.slider(right, `wheel ${k + 1}`, unit, -this.robot.limit, this.robot.limit, 0,
-      (v) => { this.offset[k] = v; this.socket.send(JSON.stringify({ offset: this.offset })); }, `wheel-${k + 1}`));
+    this.robot.wheels.forEach((_, k) => this.slider(right, `wheel ${k + 1}`, unit, -this.robot.limit, this.robot.limit, 0,
+      (v) => { this.offset[k] = v; this.give({ offset: this.offset }); }, `wheel-${k + 1}`));
     make('h3', right, { textContent: 'Change while it moves' });
-    this.sliders = {};
-    for (const n of this.robot.numbers)
-      this.sliders[n.key] = this.slider(right, n.words, n.unit, 0, n.value > 0 ? 4 * n.value : 1, n.value,
-        (v) => this.socket.send(JSON.stringify({ set: { [n.key]: v } })), n.key).set;
+    this.varied = {};
+    for (const [kind, [words, of]] of Object.entries(VARIED)) {
+      const act = (v) => this.give({ vary: { [kind]: v } }), names = this.robot.names[kind], range = this.robot.ranges[kind];
+      if (names) this.varied[`${kind} by name`] = this.choice(right, `${kind === 'tilt' ? 'slope' : kind} by name`, names, act, `${kind}-name`);
+      if (range) this.varied[kind] = this.slider(right, words, of, ...range, act, kind).set;
+    }
+    this.numbers = make('div', right);
+    this.follow();
     this.strips = make('canvas', this);
     this.strips.setAttribute('role', 'img'); this.strips.setAttribute('aria-label', 'The last ten seconds');
     const tools = make('div', this, { className: 'tools' });
     make('button', tools, { type: 'button', textContent: 'Save picture', onclick: () => save(this.strips, 'drive.png') });
   }
+  // Show the robot as it is now: another page, or a floor, may have changed it
+  follow() {
+    const { numbers, varied, ranges, breakaway, unit } = this.robot, keys = numbers.map((n) => n.key).join();
+    if (keys !== this.keys) {
+      this.keys = keys; this.sliders = {}; this.numbers.replaceChildren();
+      for (const n of numbers)
+        this.sliders[n.key] = this.slider(this.numbers, n.words, n.unit, 0, n.value > 0 ? 4 * n.value : 1, n.value, (v) => this.give({ set: { [n.key]: v } }), n.key).set;
+    }
+    for (const n of numbers) this.sliders[n.key](n.value);
+    for (const [kind, choice] of Object.entries(varied)) {
+      const named = typeof choice === 'string';
+      this.varied[`${kind} by name`]?.(named ? choice : '');
+      this.varied[kind]?.(named ? ranges[kind][2] : choice);
+    }
+    this.note.textContent = breakaway.every((v) => v === null) ? ''
+      : `moves from ${['forward', 'sideways', 'turning'].map((n, k) => `${n} ${breakaway[k] === null ? '-' : short(breakaway[k])} ${unit}`).join(', ')}`;
+  }
+  // Buttons to hold down, where there is no keyboard
+  pads(parent) {
+    for (const [key, words] of PADS) {
+      const pad = make('button', parent, { type: 'button', innerHTML: `<b>${key.toUpperCase()}</b> ${words}` });
+      const hold = (on) => { if (on === this.held.has(key)) return; if (on) this.held.add(key); else this.held.delete(key); this.send(); };
+      pad.onpointerdown = (e) => { if (pad.hasPointerCapture?.(e.pointerId) === false) pad.setPointerCapture(e.pointerId); hold(true); };
+      pad.onpointerup = pad.onpointercancel = pad.onlostpointercapture = () => hold(false);
+      pad.onkeydown = (e) => { if (e.key === ' ' || e.key === 'Enter') { e.preventDefault(); hold(true); } };
+      pad.onkeyup = pad.onblur = () => hold(false);
+      pad.oncontextmenu = (e) => e.preventDefault();
+    }
+  }
+  choice(parent, words, names, act, name) {
+    const row = make('div', parent, { className: 'slider' });
+    make('span', row, { textContent: words });
+    const select = make('select', row, { name });
+    select.setAttribute('aria-label', words);
+    for (const value of ['', ...names]) make('option', select, { value, textContent: value || 'as in the file' });
+    select.onchange = () => act(select.value);
+    return (v) => { select.value = v; };
+  }
   slider(parent, words, unit, low, high, value, act, name) {
-    const label = make('label', parent);
-    make('span', label, { textContent: words });
-    const input = make('input', label, { type: 'range', min: low, max: high, step: (high - low) / 400 || 1, value, name });
-    const output = make('output', label);
-    const show = () => { output.textContent = `${short(+input.value)} ${unit}`; };
+    const row = make('div', parent, { className: 'slider' }), step = 10 ** Math.floor(Math.log10((high - low) / 200));
+    make('span', row, { textContent: words });
+    const by = (sign, title) => {
+      const button = make('button', row, { type: 'button', textContent: sign > 0 ? '+' : '\u2212', onclick: () => { input.value = +input.value + sign * 10 * step; input.oninput(); } });
+      button.setAttribute('aria-label', `${title}: ${words}`);
+    };
+    by(-1, 'less');
+    const input = make('input', row, { type: 'range', min: low, max: high, step, value, name });
+    by(1, 'more');
+    input.setAttribute('aria-label', words);
+    const output = make('output', row);
+    const show = (v = +input.value) => { output.textContent = `${short(v)} ${unit}`; };
     let sent = 0;
     input.oninput = () => { show(); clearTimeout(sent); sent = setTimeout(() => act(+input.value), 60); };
     input.ondblclick = () => { input.value = low < 0 ? 0 : value; input.oninput(); };
-    show();
-    return { get: () => +input.value, set: (v) => { if (document.activeElement !== input) { input.value = v; show(); } } };
+    show(value);
+    return { get: () => +input.value, set: (v) => { if (document.activeElement !== input) { input.value = v; show(v); } } };
   }
   key(event, down) {
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
@@ -89,9 +133,8 @@ class Drive extends HTMLElement {
     }
     return axes.map((v) => Math.max(-1, Math.min(1, v)));
   }
-  send() {
-    if (this.socket?.readyState === 1) this.socket.send(JSON.stringify({ axes: this.axes(), level: this.level.get() }));
-  }
+  give(command) { if (this.socket?.readyState === 1) this.socket.send(JSON.stringify(command)); }
+  send() { this.give({ axes: this.axes(), level: this.level.get() }); }
   keep(f) {
     this.strip.push(f); if (this.strip.length > STRIP) this.strip.shift();
     const last = this.trail[this.trail.length - 1];
@@ -99,7 +142,7 @@ class Drive extends HTMLElement {
     if (this.trail.length > 3000) this.trail.shift();
     if ([...(navigator.getGamepads?.() || [])].some(Boolean)) this.send();
   }
-  wheel(f, k, what) { return f[HEAD + what * this.robot.azimuth.length + k]; }
+  wheel(f, k, what) { return f[HEAD + what * this.robot.wheels.length + k]; }
   paint() {
     if (!this.alive) return;
     if (this.newest && this.drawn !== this.newest) { this.drawn = this.newest; this.painted++; this.above(this.newest); this.lines(); this.words(this.newest); }
@@ -107,7 +150,7 @@ class Drive extends HTMLElement {
   }
   above(f) {
     const size = Math.min(this.canvas.parentElement.clientWidth, 460), g = sharp(this.canvas, this.canvas.parentElement.clientWidth, size);
-    const width = this.canvas.parentElement.clientWidth, reach = Math.max(...this.robot.distance) * 6, scale = size / 2 / reach;
+    const width = this.canvas.parentElement.clientWidth, reach = this.robot.reach * 6, scale = size / 2 / reach;
     // Forward is up, left is left; the picture follows the robot
     const at = (x, y) => [width / 2 - (y - f[2]) * scale, size / 2 - (x - f[1]) * scale];
     g.strokeStyle = css('--line'); g.lineWidth = 1;
@@ -120,18 +163,17 @@ class Drive extends HTMLElement {
     g.stroke();
     const turn = (x, y) => [f[1] + x * Math.cos(f[3]) - y * Math.sin(f[3]), f[2] + x * Math.sin(f[3]) + y * Math.cos(f[3])];
     g.fillStyle = css('--soft'); g.strokeStyle = css('--ink'); g.lineWidth = 1.5;
-    g.beginPath(); g.arc(width / 2, size / 2, Math.max(...this.robot.distance) * 0.9 * scale, 0, 7); g.fill(); g.stroke();
-    g.beginPath(); g.moveTo(...at(f[1], f[2])); g.lineTo(...at(...turn(this.robot.distance[0] * 0.7, 0))); g.stroke();
-    const most = this.robot.most = Math.max(this.robot.most || 1e-9, ...this.robot.azimuth.map((_, k) => Math.abs(this.wheel(f, k, 4))));
-    this.robot.azimuth.forEach((azimuth, k) => {
-      const angle = azimuth * Math.PI / 180, b = this.robot.distance[k], r = this.robot.radius[k];
-      const cx = b * Math.cos(angle), cy = b * Math.sin(angle), tx = -Math.sin(angle), ty = Math.cos(angle);
+    g.beginPath(); g.arc(width / 2, size / 2, this.robot.reach * 0.9 * scale, 0, 7); g.fill(); g.stroke();
+    g.beginPath(); g.moveTo(...at(f[1], f[2])); g.lineTo(...at(...turn(this.robot.reach * 0.7, 0))); g.stroke();
+    const most = this.robot.most = Math.max(this.robot.most || 1e-9, ...this.robot.wheels.map((_, k) => Math.abs(this.wheel(f, k, 4))));
+    this.robot.wheels.forEach(({ ends: [[ax, ay], [bx, by]], push: [tx, ty] }, k) => {
+      const cx = (ax + bx) / 2, cy = (ay + by) / 2;
       const sticks = this.wheel(f, k, 3) === 0;
       g.strokeStyle = css(sticks ? '--c1' : '--c0'); g.lineWidth = 9; g.lineCap = 'round';
       g.setLineDash(sticks ? [4, 9] : []);
-      g.beginPath(); g.moveTo(...at(...turn(cx - tx * r, cy - ty * r))); g.lineTo(...at(...turn(cx + tx * r, cy + ty * r))); g.stroke();
+      g.beginPath(); g.moveTo(...at(...turn(ax, ay))); g.lineTo(...at(...turn(bx, by))); g.stroke();
       g.setLineDash([]);
-      const force = this.wheel(f, k, 4) / most * b * 1.2;
+      const force = this.wheel(f, k, 4) / most * this.robot.reach * 1.2;
       g.strokeStyle = css('--c2'); g.lineWidth = 3;
       g.beginPath(); g.moveTo(...at(...turn(cx, cy))); g.lineTo(...at(...turn(cx + tx * force, cy + ty * force))); g.stroke();
       g.fillStyle = css('--ink'); g.textAlign = 'center'; g.textBaseline = 'middle';
@@ -147,19 +189,20 @@ class Drive extends HTMLElement {
   words(f) {
     const still = f[4] === 0 && f[5] === 0 && f[6] === 0;
     this.state.textContent = `${still ? 'holds still' : 'moves'}: forward ${f[4].toFixed(3)} m/s, left ${f[5].toFixed(3)} m/s, turn ${f[6].toFixed(3)} rad/s`;
-    this.dataset.still = still; this.dataset.vx = f[4]; this.dataset.x = f[1];
+    this.dataset.still = still; this.dataset.vx = f[4]; this.dataset.x = f[1]; this.dataset.friction = f[8];
   }
   lines() {
-    const n = this.robot.azimuth.length, width = this.clientWidth, names = this.robot.azimuth.map((_, k) => String(k + 1));
+    const n = this.robot.wheels.length, width = this.clientWidth, names = this.robot.wheels.map((_, k) => String(k + 1));
     const wheels = (what) => names.map((_, k) => (f) => this.wheel(f, k, what));
     const panels = [['voltage of wheel [V]', names, wheels(1)], ['current of wheel [A]', names, wheels(2)], ['speed of wheel [rad/s]', names, wheels(3)],
-      ['body [m/s, rad/s]', ['forward', 'left', 'turn'], [4, 5, 6].map((k) => (f) => f[k])]];
+      ['body [m/s, rad/s]', ['forward', 'left', 'turn'], [4, 5, 6].map((k) => (f) => f[k])],
+      ['friction [N, N m]', ['forward', 'left', 'turn'], [8, 9, 10].map((k) => (f) => f[k])]];
     const high = 84, gap = 22, g = sharp(this.strips, width, panels.length * (high + gap) + 40), inner = width - LEFT - RIGHT;
     const end = this.newest[0], begin = end - STRIP / 60, x = (t) => LEFT + (t - begin) / (end - begin) * inner;
     panels.forEach(([title, labels, gets], p) => {
       const top = 20 + p * (high + gap);
       let most = 1e-6;
-      for (const f of this.strip) for (const get of gets) most = Math.max(most, Math.abs(get(f)));
+      for (const f of this.strip) for (const get of gets) most = Math.max(most, Math.abs(get(f)) || 0);
       most *= 1.08;
       const y = (v) => top + high / 2 - v / most * high / 2;
       g.strokeStyle = css('--line'); g.lineWidth = 1;
