@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import shutil
 from pathlib import Path
 from typing import Any
@@ -74,7 +75,7 @@ def show(studio: Studio) -> None:
     page = Page(session)
     tabs = studio.tabs(page)
     session.listeners.add(page.changed)
-    client.on_delete(lambda: session.listeners.discard(page.changed))
+    client.on_delete(lambda: _forget(session, page))
     dark = ui.dark_mode(None)
     with ui.header().classes("bar"):
         with ui.element("h1").classes("brand"):
@@ -93,3 +94,9 @@ def show(studio: Studio) -> None:
         words = "All logs, maps, robots and fits as one file. To open it: drop it on the tab Log, or"
         ui.label(words).classes("text quiet")
         ui.label(f"omnidyn studio {workspace.FILE_NAME}").classes("code")
+
+
+def _forget(session: Session, page: Page) -> None:
+    """A page is gone: what it was made of is a circle of thousands of objects, which only the collector takes."""
+    session.listeners.discard(page.changed)
+    asyncio.get_running_loop().call_later(1.0, gc.collect)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import re
 import secrets
 import socket
@@ -96,6 +97,8 @@ def application(studio: Studio, files: list[str]) -> FastAPI:
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         session.open(files)
         session.start(session.warm())
+        gc.collect()
+        gc.freeze()  # what is loaded stays: to look for what is left of a page takes milliseconds then
         try:
             yield
         finally:
