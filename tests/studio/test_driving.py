@@ -2,6 +2,7 @@
 
 import asyncio
 import queue
+import socket
 
 import numpy as np
 import pytest
@@ -157,3 +158,39 @@ def test_a_worker_tells_errors_in_words_and_can_be_cancelled(tmp_path):
 
     asyncio.run(asyncio.wait_for(work(), 120))
     assert len(omnidyn.read_log(tmp_path / "again.csv")) == 4001
+
+
+def test_a_page_that_says_nothing_gets_few_frames_and_the_newest_when_it_is_back():
+    import uvicorn
+    import websockets
+
+    from omnidyn.studio.layout import Studio
+    from omnidyn.studio.server import UNDER_WAY, application
+
+    async def work():
+        studio, listener = Studio(), socket.create_server(("127.0.0.1", 0))
+        server = uvicorn.Server(uvicorn.Config(application(studio, []), log_level="warning"))
+        serving = asyncio.ensure_future(server.serve(sockets=[listener]))
+        while not server.started:
+            await asyncio.sleep(0.01)
+
+        async def send(*numbers):
+            for number in numbers:
+                studio.driving.frame = [float(number)]
+                for fresh in studio.driving.fresh:
+                    fresh.set()
+                await asyncio.sleep(0.001)
+
+        async with websockets.connect(f"ws://127.0.0.1:{listener.getsockname()[1]}/drive", max_queue=None) as page:
+            await send(*range(1000))
+            got = [float(np.frombuffer(await page.recv(), "<f4", offset=4)[0]) for _ in range(UNDER_WAY)]
+            assert got == [float(k) for k in range(UNDER_WAY)]
+            await page.send(f'{{"seen": {UNDER_WAY}}}')
+            await asyncio.sleep(0.1)
+            await send(1000)
+            assert np.frombuffer(await asyncio.wait_for(page.recv(), 5), "<f4", offset=4)[0] == 1000.0
+        server.should_exit = True
+        await serving
+        listener.close()
+
+    asyncio.run(asyncio.wait_for(work(), 60))

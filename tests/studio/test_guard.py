@@ -1,17 +1,17 @@
 """Who may talk to the studio: asked by a raw client, which can say what no browser would."""
 
+import asyncio
 import base64
-import contextlib
 import json
 import os
 import socket
 import tempfile
-import threading
 from pathlib import Path
 
 import pytest
 
 from omnidyn.studio.guard import is_loopback
+from tests.support.raw_sockets import forwarded, open_web_socket, text_frame
 
 SOCKETS = ("/plot", "/drive", "/_nicegui_ws/socket.io/?EIO=4&transport=websocket")
 POLLING = "/_nicegui_ws/socket.io/?EIO=4&transport=polling"
@@ -77,36 +77,30 @@ def test_sockets_open_for_pages_of_this_server_only(studio, path):
     assert open_socket(studio.port, path, Origin=f"http://{host}", Host=host) == 403
 
 
-def test_a_forwarded_port_works(studio):
+def test_a_forwarded_port_works_and_guards_as_well(studio):
     """As `ssh -L` does: bytes go from another port of this machine, whose number the browser names."""
-    listener = socket.create_server(("127.0.0.1", 0))
-    port = listener.getsockname()[1]
+    with forwarded(studio.port) as port:
+        for host in (f"127.0.0.1:{port}", f"localhost:{port}", f"[::1]:{port}"):
+            mine = {"Host": host, "Origin": f"http://{host}"}
+            assert ask(port, Host=host)[0] == 200
+            assert ask(port, "/static/studio.js", Host=host)[0] == 200
+            assert ask(port, POLLING, **mine)[0] == 200
+            for path in SOCKETS:
+                assert open_socket(port, path, **mine) == 101, (host, path)
+        evil = f"evil.example:{port}"
+        for strange in (
+            {"Host": evil, "Origin": f"http://{evil}"},
+            {"Origin": "http://evil.example"},
+            {"Origin": f"http://127.0.0.1:{studio.port}"},  # the page of another port is another page
+        ):
+            assert ask(port, **strange)[0] == 403
+            assert ask(port, POLLING, **strange)[0] == 403
+            assert [open_socket(port, path, **strange) for path in SOCKETS] == [403] * len(SOCKETS)
 
-    def forward():
-        client, _ = listener.accept()
-        with client, socket.create_connection(("127.0.0.1", studio.port)) as server:
-            back = threading.Thread(target=pump, args=(server, client))
-            back.start()
-            pump(client, server)
-            back.join()
 
-    def pump(source, target):
-        try:
-            while block := source.recv(65536):
-                target.sendall(block)
-            target.shutdown(socket.SHUT_WR)
-        except OSError:  # the client has closed
-            for end in (source, target):
-                with contextlib.suppress(OSError):
-                    end.shutdown(socket.SHUT_RDWR)
-
-    for path, status in (("/", 200), ("/plot", 101)):
-        way = threading.Thread(target=forward)
-        way.start()
-        origin = {"Origin": f"http://127.0.0.1:{port}"}
-        assert (ask(port, path, **origin)[0] if status == 200 else open_socket(port, path, **origin)) == status
-        way.join(10)
-    listener.close()
+def test_only_this_machine_can_connect(studio):
+    with pytest.raises(OSError, match=r"refused|unreachable|timed out"):
+        socket.create_connection(("127.0.0.2", studio.port), 5)
 
 
 def test_only_what_belongs_to_the_page_is_served(studio):
@@ -181,6 +175,35 @@ def test_uploads_are_bounded_in_number(start):
         assert statuses[-1] == 413
 
 
+def test_uploads_are_bounded_in_size_one_by_one_and_all_together(monkeypatch):
+    from omnidyn.studio import session
+    from omnidyn.studio.session import RefusedError, Session
+
+    async def body(size):
+        for _ in range(size // 100):
+            yield b"x" * 100
+
+    async def work():
+        studio = Session()
+        monkeypatch.setattr(studio, "check", lambda log: asyncio.sleep(0))
+        for size, taken in ((900, True), (1100, False), (800, True), (400, False), (300, True)):
+            if taken:
+                await studio.upload("log.csv", body(size))
+            else:
+                with pytest.raises(RefusedError):
+                    await studio.upload("log.csv", body(size))
+        sizes = [path.stat().st_size for path in sorted(studio.folder.rglob("log.csv"))]
+        assert sorted(sizes) == [300, 800, 900]  # nothing is left of what was refused
+        studio.remove(next(iter(studio.logs.values())))  # its 900 bytes are free again
+        await studio.upload("log.csv", body(800))
+        await studio.close()
+        assert not studio.folder.exists()
+
+    monkeypatch.setattr(session, "MAX_FILE_BYTES", 1000)
+    monkeypatch.setattr(session, "MAX_BYTES", 2000)
+    asyncio.run(work())
+
+
 def test_another_host_needs_the_token(start):
     with start("--host", "0.0.0.0") as server:
         token = server.address.partition("?token=")[2]
@@ -194,3 +217,22 @@ def test_another_host_needs_the_token(start):
         assert open_socket(server.port, "/drive", **cookie) == 101
         assert open_socket(server.port, "/drive", Origin=cookie["Origin"]) == 403
         assert ask(server.port, Cookie=cookie["Cookie"], Origin="http://evil.example")[0] == 403
+        server.process.terminate()
+        assert token not in server.process.stdout.read()  # it was printed once
+
+
+def test_what_a_socket_does_not_know_closes_it_and_nothing_else(studio):
+    for path in ("/plot", "/drive"):
+        for words in (
+            b"no json",
+            b"[1]",
+            b'{"series": "x", "begin": "y"}',
+            b'{"seen": "x", "axes": 1}',
+            b"x" * 100_000,
+        ):
+            with open_web_socket(studio.port, path) as client:
+                client.sendall(text_frame(words))
+    assert ask(studio.port)[0] == 200
+    with open_web_socket(studio.port, "/plot") as client:
+        client.sendall(text_frame(b'{"series": "x", "begin": 0, "end": 1, "width": 9}'))
+        assert client.recv(2) == b"\x82\x00"  # a picture that is no more: an empty frame

@@ -38,8 +38,10 @@ ROBOT_FILE = re.compile(r"[^/\\]+\.toml", re.IGNORECASE)
 TRIES = 20  # ports from the one asked for
 FIT_FILES = {"robot.toml": "text/plain", "numbers.csv": "text/csv", "report.html": "text/html"}
 NO_SCRIPT = "default-src 'none'; style-src 'unsafe-inline'; img-src data: 'self'; frame-ancestors 'none'"
+UNDER_WAY = 30  # frames of a drive that a page has not had yet: half a second
 MESSAGE_BYTES = 65_536  # of what a page sends over a socket
 CLOSED = (WebSocketDisconnect, RuntimeError)  # how a socket says that its page is gone
+NONSENSE = (ValueError, KeyError, TypeError, AttributeError)  # what a page says that is none of ours: its socket closes
 
 
 def serve(files: list[str], host: str, port: int, browse: bool) -> int:
@@ -58,6 +60,7 @@ def serve(files: list[str], host: str, port: int, browse: bool) -> int:
         Guard(app, token),
         log_level="warning",
         ws_max_size=MESSAGE_BYTES,
+        ws_per_message_deflate=False,  # frames are small, and each page would keep a third of a megabyte for it
         timeout_graceful_shutdown=1,
         server_header=False,
     )
@@ -102,6 +105,7 @@ def application(studio: Studio, files: list[str]) -> FastAPI:
         try:
             yield
         finally:
+            gc.unfreeze()
             await session.close()
 
     app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
@@ -191,7 +195,7 @@ def _add_sockets(app: FastAPI, studio: Studio) -> None:
     @app.websocket("/plot")
     async def plot(socket: WebSocket) -> None:
         await socket.accept()
-        with contextlib.suppress(*CLOSED):
+        with contextlib.suppress(*CLOSED, *NONSENSE):
             while True:
                 request = await socket.receive_json()
                 shown = session.series.get(str(request.get("series")))
@@ -203,24 +207,31 @@ def _add_sockets(app: FastAPI, studio: Studio) -> None:
 
     @app.websocket("/drive")
     async def drive(socket: WebSocket) -> None:
-        """Frames out, commands in. A slow page loses frames: only the newest ever waits."""
+        """Frames out, commands in. A slow page loses frames: it says how many it has, and few are under way to it."""
         await socket.accept()
-        fresh = asyncio.Event()
+        fresh, seen = asyncio.Event(), 0
         driving.fresh.add(fresh)
 
         async def send() -> None:
+            sent = 0
             with contextlib.suppress(*CLOSED):
                 while True:
                     await fresh.wait()
                     fresh.clear()
+                    if sent - seen >= UNDER_WAY:
+                        continue
+                    sent += 1
                     frame = np.asarray(driving.frame, dtype="<f4")
                     await socket.send_bytes(struct.pack("<I", len(frame)) + frame.tobytes())
 
         sender = asyncio.create_task(send())
         try:
-            with contextlib.suppress(*CLOSED):
+            with contextlib.suppress(*CLOSED, *NONSENSE):
                 while True:
-                    _take(driving, await socket.receive_json())
+                    command = await socket.receive_json()
+                    if isinstance(command, dict) and isinstance(command.get("seen"), int):
+                        seen = command["seen"]
+                    _take(driving, command)
         finally:
             sender.cancel()
             driving.fresh.discard(fresh)
@@ -231,4 +242,6 @@ def _add_sockets(app: FastAPI, studio: Studio) -> None:
 def _take(driving: Driving, command: Any) -> None:
     """A command of a page, as far as it is one."""
     if isinstance(command, dict):
-        driving.send({name: command[name] for name in ("axes", "level", "offset", "set", "vary") if name in command})
+        known = {name: command[name] for name in ("axes", "level", "offset", "set", "vary") if name in command}
+        if known:
+            driving.send(known)

@@ -64,6 +64,7 @@ class Drive:
     def run(self) -> dict[str, Any]:
         """Go on until the page says stop."""
         self.live.step(np.zeros(self.robot.wheels.count))  # what is compiled or loaded is not part of the drive
+        self._friction(self.live.voltage)
         self.live = LiveRobot(self.robot, DT)
         self._introduce()
         due = time.perf_counter()

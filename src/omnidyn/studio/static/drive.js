@@ -13,7 +13,7 @@ class Drive extends HTMLElement {
     this.socket = new WebSocket(socketUrl('/drive'));
     this.socket.binaryType = 'arraybuffer';
     this.received = 0; this.painted = 0;
-    this.socket.onmessage = (e) => { this.newest = new Float32Array(e.data, 4); this.received++; this.keep(this.newest); };
+    this.socket.onmessage = (e) => { this.newest = new Float32Array(e.data, 4); this.received++; this.keep(this.newest); if (this.received % 6 === 0) this.give({ seen: this.received }); };
     this.down = (e) => this.key(e, true); this.up = (e) => this.key(e, false);
     this.away = () => { this.held.clear(); this.send(); };
     addEventListener('keydown', this.down); addEventListener('keyup', this.up); addEventListener('blur', this.away);
