@@ -105,9 +105,10 @@ class Given:
             while futures:
                 for future in wait(futures, return_when=FIRST_COMPLETED).done:
                     yield futures.pop(future), _words(future)
-        except BaseException:
-            for future in futures:
-                future.cancel()
+        except BaseException as raised:
+            running = [future for future in futures if not future.cancel()]
+            if isinstance(raised, Exception):  # nobody may write any more when this has ended; an interrupt waits not
+                wait(running)
             raise
 
 

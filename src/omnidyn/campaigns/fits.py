@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from omnidyn.campaigns.spec import IdentifyTask, Spec, Variable
-from omnidyn.errors import InputError, InsufficientDataError, MissingExtraError
+from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.files import open_regular, pieces
 from omnidyn.identification.identification import Identification
 from omnidyn.identification.identify import identify
@@ -47,22 +47,23 @@ def with_logs(spec: Spec, base: Path) -> Spec:
         return spec
     if LOG in spec.vary:
         raise InputError("the logs vary already", got=LOG, expected="logs = [..] in [identify]", where="[vary]")
-    held = _paths(task.hold_out, base)
+    held_out = _paths(task.hold_out, base)
     if isinstance(task.logs, Mapping):
         sets = {name: _paths(patterns, base) for name, patterns in task.logs.items()}
-        strays = {*held} - {path for paths in sets.values() for path in paths}
+        strays = {*held_out} - {path for paths in sets.values() for path in paths}
         if strays:
             raise InputError("no set holds this log", got=min(strays), where="[identify] hold_out")
     else:
-        single = [path for path in _paths(task.logs, base) if path not in held]
-        sets = {name: [path, *held] for name, path in zip(_short(single), single, strict=True)}
+        single = [path for path in _paths(task.logs, base) if path not in held_out]
+        sets = {name: [path, *held_out] for name, path in zip(_short(single), single, strict=True)}
     for name, paths in sets.items():
-        if not {*paths} - {*held}:
+        if not {*paths} - {*held_out}:
             raise InputError("every log is held out", got=name, expected="one or more to fit", where="[identify]")
     if not sets:
         raise InputError("every log is held out", expected="one or more to fit", where="[identify]")
     return spec.replace(
-        vary={LOG: Variable(values=tuple(sets)), **spec.vary}, identify=task.replace(logs=sets, hold_out=tuple(held))
+        vary={LOG: Variable(values=tuple(sets)), **spec.vary},
+        identify=task.replace(logs=sets, hold_out=tuple(held_out)),
     )
 
 
@@ -126,32 +127,30 @@ def _options(task: IdentifyTask) -> LogOptions:
     )
 
 
-def fitted(name: str, robot: Robot, task: IdentifyTask, hashes: Mapping[str, str]) -> Row:
+def fit_row(name: str, robot: Robot, task: IdentifyTask, hashes: Mapping[str, str]) -> Row:
     """What a fit says: verdict, words, method, each number, and what free runs, or shapes of friction, are off by.
 
     name: of the fit in `logs`. robot: where it starts. hashes: file -> sha256 as it was when the campaign began.
     Raises InputError where a log has changed since.
     """
-    paths, held = task.logs[name], {*task.hold_out}
+    paths, held_out = task.logs[name], {*task.hold_out}
     for file in (file for path in paths for file in files_of(path)):
         if hashes and hashes.get(str(file)) != _sha256(file):
             raise InputError("the log has changed since the campaign began", where=str(file))
     try:
         logs = [load_log(path, robot, _options(task)) for path in paths]
         runs = [log.to_run(sort=task.read.sort) for log in logs]
-    except MissingExtraError:
-        raise
     except (InputError, InsufficientDataError) as error:
-        return _refused(Statement("log_not_read", ERROR, name, {"error": str(error)}))
+        return _row_without_numbers(Statement("log_not_read", ERROR, name, {"error": str(error)}))
     try:
-        hold_out = [glob.escape(path) for path in paths if path in held]
+        hold_out = [glob.escape(path) for path in paths if path in held_out]
         method = task.method_asked()
         return _row(identify(runs, robot, method, hold_out=hold_out, quick=task.quick, check=logs))
     except (InputError, InsufficientDataError) as error:
-        return _refused(Statement("log_not_fitted", ERROR, name, {"error": str(error)}))
+        return _row_without_numbers(Statement("log_not_fitted", ERROR, name, {"error": str(error)}))
 
 
-def _refused(statement: Statement) -> Row:
+def _row_without_numbers(statement: Statement) -> Row:
     return {"ok": False, VERDICT: statement.code, "words": str(statement), "method": ""}
 
 

@@ -245,7 +245,7 @@ class Folder:
             )
         _, parquet = import_pyarrow()
         schema = self.schema(status.done)
-        tables = (completed(parquet.read_table(self.shard_path(shard)), schema) for shard in status.done)
+        tables = (with_columns(parquet.read_table(self.shard_path(shard)), schema) for shard in status.done)
         with (
             open_atomic(self.path / MERGED, force=True) as stream,
             parquet.ParquetWriter(stream, schema, write_page_checksum=True) as writer,
@@ -269,7 +269,7 @@ class Folder:
         return pyarrow.unify_schemas([parquet.read_schema(self.shard_path(shard)) for shard in shards])
 
 
-def completed(table: Any, schema: Any) -> Any:
+def with_columns(table: Any, schema: Any) -> Any:
     """The table with all columns of a schema; null where it has none."""
     pyarrow, _ = import_pyarrow()
     if table.schema == schema:

@@ -174,7 +174,10 @@ def _version() -> str:
 
 def _rows(pool: Pool, problem: Problem) -> int:
     """Samples of a shard: as many as take SHARD_S, as the first ones show; whole blocks."""
-    seconds, block = pool.call(_seconds, problem), block_rows(problem)
+    block = block_rows(problem)
+    if sample_count(problem.spec) <= block:
+        return block
+    seconds = pool.call(_seconds, problem)
     rows = ROWS_UNMEASURED if seconds is None else min(math.ceil(SHARD_S / seconds), MOST_ROWS)
     return -(-rows // block) * block
 

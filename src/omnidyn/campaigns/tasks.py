@@ -18,7 +18,7 @@ import numpy as np
 from omnidyn.arguments import unknown_option
 from omnidyn.arrays import FloatArray
 from omnidyn.campaigns.design import numbers, points, sample_count, seed_of
-from omnidyn.campaigns.fits import LOG, Row, check_fit, fitted
+from omnidyn.campaigns.fits import LOG, Row, check_fit, fit_row
 from omnidyn.campaigns.spec import IdentifyTask, SimulateTask, Spec, TrackTask
 from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
 from omnidyn.control.controller import Controller
@@ -225,7 +225,7 @@ class Problem:
         """What a fit says."""
         assert self.spec.identify is not None
         task = self._fit_task(sample, self.spec.identify)
-        return fitted(str(sample.values[LOG]), sample.robot, task, self.hashes)
+        return fit_row(str(sample.values[LOG]), sample.robot, task, self.hashes)
 
     def measure(self, sample: Sample) -> dict[str, float]:
         """What is measured of a sample, by name."""
