@@ -15,6 +15,7 @@ from omnidyn.errors import InputError
 from omnidyn.model.friction import Friction
 from omnidyn.model.friction.direction import DirectionFriction
 from omnidyn.model.friction.stribeck import SHAPES
+from omnidyn.model.log_effects import Sensors
 from omnidyn.model.mass import per_mass
 from omnidyn.model.sliding import sliding_wrench
 from omnidyn.simulation.live import LiveRobot
@@ -179,6 +180,22 @@ def test_many_robots_are_each_as_one():
         assert np.array_equal(volts, np.stack([sent, np.zeros(3), sent]))
     with pytest.raises(InputError, match="wrong shape"):
         many.step_batch(1.0, poses[:2], twists, along)
+
+
+def test_many_robots_doubt_poses_as_one_does():
+    along, single, rng = path("eight"), Mpc(ROBOT), np.random.default_rng(5)
+    many, doubts = single.batch(2), set()
+    for k in range(60):
+        at = along.at(k * DT)
+        state = np.concatenate([at.pose, np.zeros(3)]) + 0.05 * rng.standard_normal(6)
+        state[:2] += 0.5 * (k == 40)
+        sent = single.step(k * DT, state[:3], state[3:], along)
+        doubts.add(single.info.status)
+        poses, twists = np.tile(state[:3], (2, 1)), np.tile(state[3:], (2, 1))
+        assert np.array_equal(many.step_batch(k * DT, poses, twists, along), [sent] * 2)
+    assert len(doubts) > 1  # some poses were doubted
+    with pytest.raises(InputError, match="as they are"):
+        Mpc(ROBOT.replace(sensors=Sensors(pose_delay=0.1))).batch(2)
 
 
 @pytest.mark.parametrize(

@@ -161,13 +161,24 @@ class Mpc:
         return {"push": self._memory.estimate[PUSH].copy(), "friction": self._memory.estimate[SCALE].copy()}
 
     def batch(self, count: int) -> Batch:
-        """As many controllers of the same robot as asked for, in one: `Batch.step_batch`. They begin anew."""
+        """As many controllers of the same robot as asked for, in one: `Batch.step_batch`. They begin anew.
+
+        Raises InputError for a robot whose poses arrive late or whose speeds are filtered.
+        """
+        if self._late_pose is not None or self._filtered_twist is not None:
+            raise InputError(
+                "many robots in one take poses and speeds as they are",
+                got=f"sensors of {self.robot.name}: poses that arrive late, or filtered speeds",
+                expected="[sensors] without pose_delay_s, pose_rate_Hz and twist_filter_s, or an Mpc for each robot",
+                where="batch",
+            )
         return Batch(
             self._numbers,
             self._tables,
             self._room,
             self.robot_settings,
             self._preview,
+            PoseGate(self.robot, self.dt),
             _whole("count", count, 1, 10_000_000),
         )
 

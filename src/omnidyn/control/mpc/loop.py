@@ -53,6 +53,7 @@ from omnidyn.control.mpc.program import (
 from omnidyn.control.mpc.riccati import ANSWER_SIZE, STAGE_SIZE, drive_of
 from omnidyn.control.mpc.settings import Preview, Settings, Tables
 from omnidyn.control.mpc.small import put3, vector
+from omnidyn.control.pose_gate import PoseGate
 from omnidyn.errors import InputError
 
 LARGEST_STATE = 1e9  # of any number of a state
@@ -307,17 +308,24 @@ class Batch:
     """The controllers of `count` robots; made by `Mpc.batch`. Gives volts."""
 
     def __init__(
-        self, numbers: Numbers, tables: Tables, room: MpcWorkspace, settings: Settings, preview: Preview, count: int
+        self,
+        numbers: Numbers,
+        tables: Tables,
+        room: MpcWorkspace,
+        settings: Settings,
+        preview: Preview,
+        gate: PoseGate,
+        count: int,
     ) -> None:
         self.count, self._numbers, self._tables, self._room, self._settings = count, numbers, tables, room, settings
-        self._like = preview
+        self._like, self._gate = preview, gate
         self.reset()
 
     def reset(self) -> None:
         """Forget all steps."""
         blank = Memory.of(self._like.ahead, len(self._tables.weight), self._like.inputs, self._settings)
         self._memory = Memory._make(np.repeat(array[None], self.count, axis=0) for array in blank)
-        self._known = np.zeros(self.count, bool)
+        self._known, self._seen = np.zeros(self.count, bool), np.zeros((self.count, 7, 3))
         self._previews: list[Preview] = []
 
     def step_batch(self, t: float, pose: FloatArray, twist: FloatArray, path: Any | Sequence[Any]) -> FloatArray:
@@ -328,6 +336,7 @@ class Batch:
         Raises InputError for other shapes.
         """
         state = np.concatenate([self._checked("pose", pose), self._checked("twist", twist)], axis=1)
+        self._gate.judge_each(self._seen, t, state)
         paths = list(path) if isinstance(path, Sequence) else [path]
         if len(paths) not in (1, self.count):
             raise InputError("no path for each robot", got=len(paths), expected=f"1 or {self.count}", where="path")
