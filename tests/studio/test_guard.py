@@ -164,13 +164,14 @@ def test_a_bad_workspace_is_told_and_refused(start, tmp_path):
         assert ask(server.port, "/workspace", Origin="http://evil.example")[0] == 403
 
 
-def test_uploads_are_bounded_in_number(start):
+@pytest.mark.parametrize("kind", ["", "track"])
+def test_uploads_are_bounded_in_number(start, kind):
     from omnidyn.studio.session import MAX_FILES
 
     with start() as server:
         mine, statuses = f"http://127.0.0.1:{server.port}", []
         for _ in range(MAX_FILES):
-            statuses.append(ask(server.port, "/upload?name=a.toml2", "POST", b"", Origin=mine)[0])
+            statuses.append(ask(server.port, f"/upload?name=a.toml2&kind={kind}", "POST", b"", Origin=mine)[0])
         assert statuses[0] == 200
         assert statuses[-1] == 413
 

@@ -45,6 +45,7 @@ class Session:
         self.series: dict[str, Series] = {}
         self.listeners: set[Callable[[str], None]] = set()
         self.workers = {name: Worker() for name in ("log", "fit", "drive", TRACK, COMPARE, "warm")}
+        self.others = 0  # files that are neither logs nor robots
         self.takers: dict[str, Callable[[str, str], object]] = {"": self.add_log, ROBOT_SUFFIX: self.add_robot}
         self.count, self._bytes, self._tasks = 0, 0, set[asyncio.Task[Any]]()
 
@@ -103,7 +104,7 @@ class Session:
 
         kind: what it is, one of `takers`; "" where its suffix says it.
         """
-        if len(self.logs) + len(self.robots) >= MAX_FILES:
+        if len(self.logs) + len(self.robots) + self.others >= MAX_FILES:
             raise RefusedError(f"{MAX_FILES}")
         safe = safe_name(name)
         path, size = self.new_folder() / safe, 0
@@ -129,7 +130,7 @@ class Session:
 
     def make_room(self, count: int, size: int) -> None:
         """Count files that lie in the folder of the session [bytes]. Raises RefusedError for too many."""
-        if len(self.logs) + len(self.robots) + count > MAX_FILES or self._bytes + size > MAX_BYTES:
+        if len(self.logs) + len(self.robots) + self.others + count > MAX_FILES or self._bytes + size > MAX_BYTES:
             raise RefusedError
         self._bytes += size
 

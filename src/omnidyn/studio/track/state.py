@@ -44,6 +44,7 @@ class Tracks:
 
     def add_file(self, path: str, name: str) -> None:
         """Take a file that was dropped: a controller by its suffix, else a path."""
+        self.session.others += 1
         if name.lower().endswith((ROBOT_SUFFIX, POLICY_SUFFIX)):
             self.controller_files[name] = path
             self.controllers = [*self.controllers, name]
