@@ -19,9 +19,9 @@ def progress_of(part: str) -> str:
 
 @dataclass
 class Task:
-    """A job. result: of it; error: in words. running, progress, share: while it goes on. folder: of its files.
+    """A job. result: of it; error: in words. folder: of its files. command, python: that do the same.
 
-    series: of its signals, by the names of their folders. command, python: that do the same.
+    running, progress, share, spent, left [s]: while it goes on. series: of its signals, by the names of their folders.
     """
 
     result: dict[str, Any] | None = None
@@ -29,6 +29,8 @@ class Task:
     running: bool = False
     progress: str = ""
     share: float | None = None
+    spent: float = 0.0
+    left: float | None = None
     folder: Path | None = None
     series: dict[str, str] = field(default_factory=dict)
     command: str = ""
@@ -45,7 +47,7 @@ class Task:
         session.changed(part)
 
         def listen(kind: str, value: Any) -> None:
-            self.progress, self.share = value["text"], value["share"]
+            self.progress, self.share, self.spent, self.left = (value[k] for k in ("text", "share", "spent", "left"))
             session.changed(progress_of(part))
 
         try:

@@ -8,9 +8,9 @@ from typing import Any
 
 import omnidyn
 from omnidyn.document import Document
-from omnidyn.progress import Report
+from omnidyn.progress import Progress, Report
 from omnidyn.report.drift_picture import draw_drift
-from omnidyn.studio.job import Tell, listener, options_of, shown, write_free_runs
+from omnidyn.studio.job import Tell, options_of, shown, timed, write_free_runs
 
 PICTURE = "drift.svg"
 
@@ -20,9 +20,14 @@ def compare(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, 
 
     request: "robots" (paths), "logs" (path, map, unsigned each), "folder" of the results.
     """
-    listen, folder = listener(tell), Path(request["folder"])
+    with timed(tell) as listen:
+        return _compared(request, listen)
+
+
+def _compared(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
+    folder = Path(request["folder"])
     folder.mkdir(parents=True)
-    listen(Report("reading", urgent=True))
+    listen(Report("reading"))
     robots = [omnidyn.load_robot(path) for path in request["robots"]]
     runs, unsigned = [], False
     for log in request["logs"]:
@@ -31,7 +36,7 @@ def compare(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, 
         runs.append(run.replace(warnings=(*run.warnings, *loaded.columns.doubts)))
         unsigned = unsigned or log["unsigned"]
     comparison = omnidyn.compare(robots[0], runs, *robots[1:], current_unsigned=unsigned, progress=listen)
-    listen(Report("drawing", urgent=True))
+    listen(Report("drawing"))
     brief = Document([*comparison.brief_head(), comparison.brief_table()], verdict=comparison.verdict)
     paths = {f"log-{k + 1}": Path(log["path"]) for k, log in enumerate(request["logs"])}
     names = {

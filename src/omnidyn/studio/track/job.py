@@ -17,9 +17,9 @@ from omnidyn.control.paths.motion import Path
 from omnidyn.control.tracking import Trackings, trackings_document
 from omnidyn.document import plain
 from omnidyn.model.robot import Robot
-from omnidyn.progress import Report
+from omnidyn.progress import Progress, Report
 from omnidyn.report.figures.robot import wheel_lines, wheel_places
-from omnidyn.studio.job import Tell, listener, robot_of, shown
+from omnidyn.studio.job import Tell, robot_of, shown, timed
 from omnidyn.studio.series import write_series
 
 DRAWN, MOTION, SERIES = "drawn.csv", "motion.json", "series"
@@ -32,14 +32,19 @@ def track(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, An
     request: "robot", "plant" ("" for the same), "path" (as `track` takes it), "file" (the name of one, where it is
     one), "points", "speed" and "closed" of one drawn by hand, "controllers", "sensors", "folder" of the results.
     """
-    listen, folder, robot = listener(tell), FilePath(request["folder"]), robot_of(request)
+    with timed(tell) as listen:
+        return _tracked(request, listen)
+
+
+def _tracked(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
+    folder, robot = FilePath(request["folder"]), robot_of(request)
     assert robot is not None
     folder.mkdir(parents=True)
-    listen(Report("reading", urgent=True))
+    listen(Report("reading"))
     plant = omnidyn.load_robot(request["plant"]) if request["plant"] else robot
     sensors, path = request["sensors"] or None, _path(request, folder)
     trackings = omnidyn.track(robot, path, request["controllers"], plant=plant, sensors=sensors, progress=listen)
-    listen(Report("drawing", urgent=True))
+    listen(Report("drawing"))
     demand = omnidyn.path_demand(told(robot, sensors), path)
     for k, tracking in enumerate(trackings):
         omnidyn.write_run(tracking.run, folder / f"run-{k + 1}.csv")
