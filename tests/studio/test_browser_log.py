@@ -67,6 +67,19 @@ def test_two_logs_are_put_on_one_time_axis(browser, tmp_path):
     shown(page, "two-logs")
     page.get_by_text("The same by hand").first.click()
     assert page.inner_text("#align-call") == f"omnidyn align {first} {second}"
+    choose_robot(page, "axebot")
+    page.wait_for_selector("#fit:not([disabled])")
+    page.click(".held-out")
+    page.get_by_role("option", name="camera.csv").click()
+    page.keyboard.press("Escape")
+    page.click("#fit:not([disabled])")
+    words = verdict(page, "#fit-verdict")
+    said = command("identify", first, second, "--hold-out", second, "--robot", "axebot", "--json")[0]
+    assert words == said["verdict"]
+    assert {key: f"{number['value']:.5g}" for key, number in said["parameters"].items()} == numbers(page)
+    tab_plot = "[...document.querySelectorAll('omni-plot')].find((p) => p.meta?.title)"
+    page.wait_for_function(f"{tab_plot}?.first?.shown")
+    assert page.evaluate(f"{tab_plot}.meta.title") == "held-out log: camera.csv"
 
 
 def test_a_good_log_and_three_bad_ones_that_a_button_mends(browser, tmp_path):

@@ -229,6 +229,7 @@ class Session:
         with contextlib.suppress(CancelledError, JobError):
             done = await self.workers["fit"].run("warm", {"all": False}, lambda kind, value: None)
             if not done["is_warm"]:
+                await self.workers["fit"].start()  # after a fit that came in between
                 await self.workers["warm"].run("warm", {"all": True}, lambda kind, value: None)
                 await self.workers["warm"].stop()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +22,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
 from omnidyn.studio.job import Tell, options_of, robot_of, timed, write_free_runs
 
+IDLE = 19  # of a process that waits for all others
 LOADED, COMPILED = 2, 8  # of the first runs: a simulation and a fit; those of the exact engine, seconds each
 CHOICES = (  # what a page offers beside what is free by default; any key can be named on the command line
     "body.mass_kg",
@@ -139,7 +141,7 @@ def _write_free_run(result: Identification, folder: Path) -> bool:
         return False
     comparison = validation.held_out or validation.fitted
     title = "held-out log" if validation.held_out else "fitted log"
-    return write_free_runs(comparison, 0, folder, title=f"{title}: {comparison.measured[0].source}")
+    return write_free_runs(comparison, 0, folder, title=f"{title}: {Path(comparison.measured[0].source).name}")
 
 
 def _write_report(result: Identification, request: Mapping[str, Any], path: Path) -> bool:
@@ -188,6 +190,8 @@ def warm(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any
     from omnidyn.control import first_runs as of_control
     from omnidyn.identification import first_runs as of_identification
 
+    if request["all"] and hasattr(os, "nice"):
+        os.nice(IDLE)
     made_with = circumstances()
     is_warm, runs = bool(recalled(made_with)), of_identification.first_runs()
     runs = [*runs, *of_control.first_runs()] if request["all"] else runs[: LOADED if is_warm else COMPILED]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from omnidyn.studio import calls
-from omnidyn.studio.parts import FIT, PROGRESS, ROBOT
+from omnidyn.studio.parts import FIT, FREE, PROGRESS, ROBOT
 from omnidyn.studio.series import Series
 from omnidyn.studio.session import Session
 from omnidyn.studio.worker import CancelledError, JobError
@@ -64,7 +64,7 @@ class Fitting:
             choices = await self.session.workers["log"].run("free_keys", {"robot": robot}, lambda kind, value: None)
             if robot == self._choices_of:
                 self.choices, self.free = choices, [key for key, _ in choices["default"]]
-                self.session.changed(FIT)
+                self.session.changed(FREE, FIT)
 
     def set_free(self, keys: list[str]) -> None:
         """Fit these numbers, in the order in which they are offered."""
@@ -103,6 +103,7 @@ class Fitting:
             self.free.append(added)
             if all(key != added for key, _ in self.choices["others"]):
                 self.choices["others"].append([added, added])
+            self.session.changed(FREE)
         free = self.free_keys
         folder = self.session.new_folder() / "fit"
         self.session.series.pop(self.last.series, None)

@@ -11,7 +11,7 @@ from omnidyn.cli.terminal.sizes import WHEEL
 from omnidyn.studio.elements import plot, table, verdict
 from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.page import Page
-from omnidyn.studio.parts import FIT, LOGS, PROGRESS, ROBOT
+from omnidyn.studio.parts import FIT, FREE, LOGS, PROGRESS, ROBOT
 
 WHY = {
     "no_log": "Add a log first: tab Log.",
@@ -38,6 +38,7 @@ class FitTab:
         self.page.part(self.page.robot_choice, ROBOT)
         with self.page.box("Describe another robot"):
             self._robot_form()
+        self.page.part(self._choices, FREE, LOGS, ROBOT)
         self.page.part(self._start, FIT, LOGS)
         self.page.part(self._progress, FIT, PROGRESS)
         self.page.part(self._result, FIT)
@@ -79,7 +80,8 @@ class FitTab:
         ui.button("Make this robot", on_click=make).props("outline no-caps id=make-robot")
         ui.label("What is left empty is guessed, with a wide spread, and marked as a guess.").classes("text quiet")
 
-    def _start(self) -> None:
+    def _choices(self) -> None:
+        """What is held out, and what is fitted; not made again while somebody chooses."""
         session = self.session
         if len(session.logs) > 1:
             names = {key: log.label for key, log in session.logs.items()}
@@ -89,8 +91,12 @@ class FitTab:
                 multiple=True,
                 label="Hold out: predict these logs, do not fit them",
                 on_change=lambda e: self.fitting.hold_out(e.value),
-            ).classes("wide").props("use-chips")
+            ).classes("wide held-out").props("use-chips")
         self._free()
+
+    def _start(self) -> None:
+        """The button, or why it waits."""
+        session = self.session
         code, words = self.fitting.why_not()
         with ui.row().classes("line"):
             button = ui.button("Fit", on_click=lambda: session.start(self.fitting.run())).props(

@@ -181,7 +181,8 @@ class Plot extends HTMLElement {
     g.fillStyle = css('--quiet'); g.textAlign = 'center'; g.textBaseline = 'top';
     for (const t of ticks(this.view[0], this.view[1], this.inner() / 90)) g.fillText(short(t), x(t), bottom + 5);
     g.fillText('time [s]', LEFT + this.inner() / 2, bottom + 20);
-    if (this.second) { g.textAlign = 'right'; g.fillText(`pale: ${this.dataset.words}`, width - RIGHT, bottom + 20); }
+    g.textAlign = 'right';
+    g.fillText(this.second ? `pale: ${this.dataset.words}` : this.meta.title || '', width - RIGHT, bottom + 20);
   }
   panel(g, panel, first, top, x, width) {
     const inner = this.inner(), lines = [];
