@@ -5,6 +5,7 @@ import pytest
 
 import omnidyn
 from omnidyn.errors import InputError
+from omnidyn.logs.columns.mapping import load_map
 from omnidyn.studio.log import job
 from omnidyn.studio.series import Series
 from tests.support.axebot_logs import excitation
@@ -51,3 +52,27 @@ def test_a_log_that_memory_cannot_hold_is_refused(log, tmp_path, monkeypatch):
     monkeypatch.setattr(job, "default_max_bytes", lambda: 1000)
     with pytest.raises(InputError, match=r"too large; got more than 1000 bytes.*cut it into pieces"):
         checked(log, tmp_path / "series")
+
+
+def test_a_table_of_columns_keeps_what_it_does_not_show(log, tmp_path):
+    said, _ = checked(log, tmp_path / "series")
+    rows = [dict(row) for row in said["columns"]]
+    for row in rows:
+        row |= {
+            "latency": 0.02 if row["component"] == "vx" else 0.0,
+            "frame": "room" if row["component"][0] == "v" else "",
+        }
+    job.save_columns({"rows": rows, "path": str(tmp_path / "map.toml")}, lambda kind, value: None, None)
+    columns = load_map(tmp_path / "map.toml").columns
+    assert columns["vx"].latency == 0.02
+    assert columns["vy"].frame == "room"
+    assert columns["u1"].latency == 0.0
+
+
+def test_two_logs_are_aligned_as_the_library_does(log, tmp_path):
+    run = omnidyn.read_log(log)
+    late = tmp_path / "late.csv"
+    omnidyn.write_run(run.replace(t=run.t + 0.37), late)
+    said = job.align({"logs": [{"path": str(late)}, {"path": str(log)}], "robot": ""}, lambda kind, value: None, None)
+    assert said["offset"] == omnidyn.align(omnidyn.read_log(late), run).offset
+    assert said["severity"] == "note"
