@@ -54,10 +54,10 @@ class Page:
             ).classes("wide robot")
             ui.element("omni-drop").props("words='Drop a robot file (.toml), or click'")
 
-    def calls(self, command: str, python: str, name: str = "call") -> None:
+    def calls(self, command: str, python: str, name: str = "call", title: str = "The same by hand") -> None:
         """The command line and the Python call that do the same. name: id of the former."""
         if not command:
             return
-        with self.box("The same by hand"):
+        with self.box(title):
             ui.label(command).classes("call").props(f"id={name}")
             ui.label(python).classes("call")

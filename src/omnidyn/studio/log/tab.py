@@ -77,7 +77,8 @@ class LogTab:
             self._uses(log)
             self._columns(log)
         if log.other:
-            self.page.calls(*calls.align(log, self.session.logs[log.other], self.session.robot_path), name="align-call")
+            words = calls.align(log, self.session.logs[log.other], self.session.robot_path)
+            self.page.calls(*words, name="align-call", title="The same by hand (align)")
         self.page.calls(*calls.check(log, self.session.robot_path))
 
     def _plot(self, log: LogFile, spans: list[list[Any]]) -> None:
