@@ -9,6 +9,8 @@ import contextlib
 import time
 from collections.abc import Iterator
 
+COMPILING = " (a kernel is being compiled: once, the first time)"  # behind what is being done
+
 
 class Compiling:
     """Kernels, by name: those that are being compiled just now, in any thread, and those that have been, with [s]."""

@@ -25,6 +25,7 @@ from omnidyn.errors import UnsupportedError
 from omnidyn.model.value import PerWheel, Value, number, per_wheel_number, to_list
 
 MIN_WHEELS, MAX_WHEELS = 3, 16
+WHEEL_RADII, ROBOT_RADII = (2e-3, 0.5), (5e-3, 5.0)  # [m] what robots have: of a wheel, from the centre to a wheel
 SIN_45, SIN_60 = 0.5**0.5, 0.75**0.5
 MAX_CONDITION = 1e6  # of G scaled by the robot radius: beyond it the wheels cannot move the robot in every direction
 

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 
 import omnidyn
-from omnidyn.cli.terminal.progress import COMPILING
 from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import unit as unit_of
-from omnidyn.compiled.listeners import heard
+from omnidyn.compiled.listeners import COMPILING, heard
 from omnidyn.document import Document, Points, Table
 from omnidyn.logs.columns.mapping import load_map
 from omnidyn.logs.read_log import LogOptions

@@ -8,11 +8,10 @@ import time
 from collections.abc import Iterator
 
 from omnidyn.cli.terminal.streams import say
-from omnidyn.compiled.listeners import Compiling, heard
+from omnidyn.compiled.listeners import COMPILING, Compiling, heard
 from omnidyn.progress import Progress, Report
 
 SILENT_S, NEW_S, BEAT_S = 2.0, 3.0, 5.0
-COMPILING = " (a kernel is being compiled: once, the first time)"
 WARM = "omnidyn: a first run waits for the compiler, up to a minute; `omnidyn warm` compiles for all commands, once"
 
 

@@ -10,8 +10,6 @@ from omnidyn.cli.terminal.numbers import number_words
 from omnidyn.errors import InputError
 
 LEAST_WHEELS, MOST_WHEELS = 3, 16
-WHEEL = (2e-3, 0.5)  # [m] between which the radius of a wheel is
-ROBOT = (5e-3, 5.0)  # [m] from the centre to a wheel
 USUAL_WHEEL, USUAL_ROBOT = (8e-3, 0.3), (0.03, 2.0)  # [m] what most robots have
 LENGTHS = (1e-3, 1e-2, 0.0254)  # [m] of what may have been meant: mm, cm, in
 DENSITY = (1.0, 2500.0)  # [kg/m^3] of the cube around a robot
@@ -26,9 +24,11 @@ def refuse_sizes(value: Mapping[str, Any]) -> None:
 
     value: name of an option -> number, or numbers of each wheel.
     """
+    from omnidyn.model.wheels import ROBOT_RADII, WHEEL_RADII  # imported lazily: slow to load
+
     _refuse_radians(value.get("azimuth"))
-    _refuse_length("wheel_radius", value.get("wheel_radius"), WHEEL, USUAL_WHEEL)
-    _refuse_length("robot_radius", value.get("robot_radius"), ROBOT, USUAL_ROBOT)
+    _refuse_length("wheel_radius", value.get("wheel_radius"), WHEEL_RADII, USUAL_WHEEL)
+    _refuse_length("robot_radius", value.get("robot_radius"), ROBOT_RADII, USUAL_ROBOT)
     wheel, robot, mass = (value.get(key) for key in ("wheel_radius", "robot_radius", "mass"))
     if wheel is None or robot is None or min(*_numbers(wheel), *_numbers(robot)) <= 0.0:
         return

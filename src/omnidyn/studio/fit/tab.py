@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from omnidyn.cli.terminal.sizes import ROBOT as ROBOT_SIZE
-from omnidyn.cli.terminal.sizes import WHEEL
+from omnidyn.model.wheels import ROBOT_RADII, WHEEL_RADII
 from omnidyn.studio.elements import plot, table, verdict
 from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.page import Page
@@ -47,8 +46,8 @@ class FitTab:
         """What `init` asks for, within what robots have, and the robot as it is described."""
         fields = {
             "--azimuth": ("wheels stand at [degree]", "60,180,300", "0 is forward, 90 left"),
-            "--wheel-radius": ("radius of a wheel [m]", "0.05", _range(WHEEL)),
-            "--robot-radius": ("centre to wheel [m]", "0.15", _range(ROBOT_SIZE)),
+            "--wheel-radius": ("radius of a wheel [m]", "0.05", _range(WHEEL_RADII)),
+            "--robot-radius": ("centre to wheel [m]", "0.15", _range(ROBOT_RADII)),
             "--mass": ("mass [kg]", "3", ""),
             "--voltage-limit": ("voltage limit [V]", "", "a guess where it is empty"),
             "--gear-ratio": ("gear ratio [1]", "", "a guess where it is empty"),
