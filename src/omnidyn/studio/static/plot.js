@@ -191,7 +191,7 @@ class Plot extends HTMLElement {
         const index = layer === this.first ? first + k : layer?.index(name) ?? -1;
         if (index < 0 || !layer.shown) continue;
         const { points: n, numbers } = layer.shown;
-        lines.push({ name, colour: css(`--c${k % 6}`), layer, n, numbers, at: n + 2 * n * index, x: (i) => x(layer.shown.begin + layer.offset + numbers[i]) });
+        lines.push({ name, colour: css(`--c${k % 6}`), over: k > 1 && panel.signals[0] === 'measured', layer, n, numbers, at: n + 2 * n * index, x: (i) => x(layer.shown.begin + layer.offset + numbers[i]) });
       }
     });
     let low = Infinity, high = -Infinity;
@@ -226,7 +226,7 @@ class Plot extends HTMLElement {
       g.fillText(name, at + 18, top - 3); at += 30 + g.measureText(name).width;
     });
   }
-  line(g, { name, colour, layer, n, numbers, at, x }, y, inner) {
+  line(g, { name, colour, over, layer, n, numbers, at, x }, y, inner) {
     const wide = name === 'measured' || layer === this.second; // the model, or the first log, is drawn over it
     g.strokeStyle = g.fillStyle = colour;
     g.lineWidth = wide ? 4 : 1.3; g.lineJoin = 'round'; g.globalAlpha = wide ? 0.45 : 1;
@@ -255,7 +255,9 @@ class Plot extends HTMLElement {
         if (largest !== least) g.lineTo(px, y(largest));
         pen = true;
       }
+      if (over) g.setLineDash([7, 5]); // a second model, where both agree
       g.stroke();
+      g.setLineDash([]);
     }
     g.globalAlpha = 1;
   }
