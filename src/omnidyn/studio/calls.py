@@ -86,5 +86,14 @@ def fit(logs: Sequence[LogFile], held_out: Sequence[LogFile], robot: str, free: 
     return shlex.join(words), f"omnidyn.identify([{given}], {_robot(name)}{method}{held})"
 
 
+def drive(robot: str) -> tuple[str, str]:
+    """Command lines and Python calls that say where a robot begins to move, and move it."""
+    name = Path(robot).name
+    words = [["omnidyn", "deadzone", name], ["omnidyn", "simulate", name, "voltages.csv", "-o", "run.csv"]]
+    robot_words = _robot(name)
+    python = f"omnidyn.dead_zone({robot_words})\nomnidyn.simulate({robot_words}, voltages, 1 / 60)"
+    return "\n".join(map(shlex.join, words)), python
+
+
 def _robot(name: str) -> str:
     return f"omnidyn.load_robot({name!r})"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from nicegui import ui
 
+from omnidyn.studio import calls
 from omnidyn.studio.drive.state import Driving
 from omnidyn.studio.elements import verdict
 from omnidyn.studio.page import Page
@@ -25,6 +26,7 @@ class DriveTab:
         self.page.part(self.page.robot_choice, ROBOT)
         self.page.part(self._content, DRIVE, ROBOT)
         self.page.part(self._view, VIEW)
+        self.page.part(self._calls, ROBOT)
         self.page.parts[NUMBERS] = [self._numbers]
 
     def _content(self) -> None:
@@ -54,6 +56,10 @@ class DriveTab:
         elif drive.running:
             view = self.view = ui.element("omni-drive")
             view._props["data-robot"] = json.dumps(drive.robot)
+
+    def _calls(self) -> None:
+        if self.session.robot:
+            self.page.calls(*calls.drive(self.session.robot))
 
     def _numbers(self) -> None:
         """The same element goes on with other numbers of the robot."""
