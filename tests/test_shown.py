@@ -211,3 +211,12 @@ def test_printing_imports_no_matplotlib(tmp_path):
     script = "import sys, omnidyn\nprint(omnidyn.load_robot('axebot'))\nassert 'matplotlib' not in sys.modules"
     sources = str(Path(__file__).resolve().parents[1] / "src")
     subprocess.run([sys.executable, "-c", script], cwd=tmp_path, timeout=120, check=True, env={"PYTHONPATH": sources})
+
+
+def test_sensors_with_clocks_of_their_own_are_drawn_at_their_own_rows(run):
+    rows = np.arange(len(run))[:, None] % 4
+    staggered = run.replace(
+        twist=np.where(rows == 0, run.twist, np.nan), wheel_speed=np.where(rows, run.wheel_speed, np.nan)
+    )
+    (axes,) = staggered.plot("twist").axes
+    np.testing.assert_array_equal(axes.lines[0].get_xydata().T, [run.t[::4], run.twist[::4, 0]])

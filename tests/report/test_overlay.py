@@ -80,3 +80,14 @@ def test_units_and_names_are_on_the_page(found):
 def test_what_cannot_be_drawn_is_refused(found, channels):
     with pytest.raises(InputError, match="cannot draw"):
         draw_overlay(found, channels=channels)
+
+
+def test_sensors_with_clocks_of_their_own_are_drawn_at_their_own_rows():
+    log = noisy(clean_log(AXEBOT, 1), 1)
+    rows = np.arange(len(log))[:, None] % 4
+    twist, speed = np.where(rows == 0, log.twist, np.nan), np.where(rows == 2, log.wheel_speed, np.nan)
+    run = omnidyn.Run(log.t, voltage=log.voltage, twist=twist, wheel_speed=speed)
+    figure, _ = drawn(omnidyn.compare(AXEBOT, run), channels=["vx"])
+    above, below = figure.axes[:2]
+    np.testing.assert_array_equal(above.lines[0].get_xydata().T, [log.t[::4], log.twist[::4, 0]])
+    assert len(below.lines[1].get_xdata()) == len(log.t[::4])

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from omnidyn.arrays import FloatArray
+from omnidyn.clocks import has_own_clock, samples
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import components
 from omnidyn.logs.segments import segments
@@ -69,7 +70,8 @@ def draw_channel(axes: Axes, t: FloatArray, values: FloatArray, name: str) -> No
     few = slice(None, None, max(1, len(t) // MAX_POINTS))
     for k, column in enumerate(values.T):
         if np.isfinite(column).any():
-            at, column_values = _cut(*thinned(t, column, few), t)
+            own = samples(t, column) if has_own_clock(t, column) else (t, column)
+            at, column_values = _cut(*thinned(*own, few), t)
             axes.plot(
                 at, column_values, LINES[k % len(LINES)], color=COLOURS[k % len(COLOURS)], linewidth=1.1, label=names[k]
             )

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from omnidyn.arrays import FloatArray
+from omnidyn.clocks import has_own_clock, samples
 from omnidyn.comparison.result import Comparison, Segment
 from omnidyn.comparison.traces import unit
 from omnidyn.errors import InputError
@@ -78,7 +79,7 @@ def _usual(comparison: Comparison, log: int) -> tuple[str, ...]:
 
 def _values(axes: Axes, comparison: Comparison, segments: Sequence[Segment], name: str) -> None:
     traces = [comparison.trace(comparison.robots[0], name, segment) for segment in segments]
-    t, measured = _broken([(trace.t, trace.measured) for trace in traces])
+    t, measured = _broken([_sampled(trace.t, trace.measured) for trace in traces])
     dots = {"marker": ".", "markersize": 4.0} if len(t) <= DOTS else {}
     axes.plot(t, measured, color=MEASURED, linewidth=0.9, label="measured", zorder=4, **dots)
     for robot, colour, line in zip(comparison.robots, COLOURS, LINES, strict=False):
@@ -107,7 +108,7 @@ def _errors(axes: Axes, comparison: Comparison, segments: Sequence[Segment], nam
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     for robot, colour, line in zip(comparison.robots, COLOURS, LINES, strict=False):
         traces = [comparison.trace(robot, name, segment) for segment in segments]
-        t, error = _broken([(trace.t, trace.error) for trace in traces])
+        t, error = _broken([_sampled(trace.t, trace.error) for trace in traces])
         axes.plot(t, error, line, color=colour, linewidth=1.0)
         for segment, trace in zip(segments, traces, strict=True):
             ends = comparison.band(robot, name, segment)
@@ -120,6 +121,11 @@ def _errors(axes: Axes, comparison: Comparison, segments: Sequence[Segment], nam
     axes.tick_params(labelbottom=last)
     if last:
         axes.set_xlabel("time, s")
+
+
+def _sampled(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Times and values of a piece; of a sensor with a clock of its own, at its own rows alone."""
+    return samples(t, values) if has_own_clock(t, values) else (t, values)
 
 
 def _broken(pieces: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
