@@ -249,14 +249,16 @@ def test_the_dead_zone_is_felt_and_the_drive_is_fitted(browser, tmp_path):
         page.keyboard.down(key)
         page.wait_for_timeout(350)
         page.keyboard.up(key)
-    page.click("#record")
-    page.wait_for_selector("#to-fit")
     counts = "(d => [performance.now() / 1000, d.received, d.painted])(document.querySelector('omni-drive'))"
     before, memory = np.array(page.evaluate(counts)), resident(studio)
-    for key in 6 * "wqase":  # 15 s; minutes of it: benchmarks/studio.py
-        page.keyboard.down(key)
-        page.wait_for_timeout(500)
-        page.keyboard.up(key)
+    for part in range(2):  # 15 s, recorded in the first half; minutes of it: benchmarks/studio.py
+        for key in 3 * "wqase":
+            page.keyboard.down(key)
+            page.wait_for_timeout(500)
+            page.keyboard.up(key)
+        if part == 0:
+            page.click("#record")
+    page.wait_for_selector("#to-fit")
     rates = np.diff([before, page.evaluate(counts)], axis=0)[0]
     rates = rates[1:] / rates[0]
     print(f"{rates[0]:.1f} frames a second, {rates[1]:.1f} painted")
@@ -272,5 +274,7 @@ def test_the_dead_zone_is_felt_and_the_drive_is_fitted(browser, tmp_path):
     verdict(page, "#fit-verdict")
     log = tmp_path / "drive-1.csv"
     log.write_bytes(page.request.get(f"{studio.address}log/log2/log").body())
-    assert float(numbers(page)["friction.axes.coulomb[0]"]) == pytest.approx(set_level, rel=0.02)
+    fitted = float(numbers(page)["friction.axes.coulomb[0]"])
+    print(f"friction set {set_level:g} N, fitted {fitted:g} N")
+    assert fitted == pytest.approx(set_level, rel=0.03)  # its standard error is 0.8 %
     assert_same_numbers(page, log)
