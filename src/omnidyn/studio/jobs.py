@@ -89,14 +89,14 @@ def _next(messages: queue.Queue[dict[str, Any] | None]) -> dict[str, Any] | None
 
 def _answer(message: dict[str, Any], tell: Listener, commands: queue.Queue[Any]) -> tuple[str, Any]:
     """What a job ends with."""
-    from omnidyn.errors import OmnidynError, told_by
+    from omnidyn.errors import INTERRUPTS, OmnidynError, told_by
 
     try:
         return "result", JOBS[message["job"]](message["request"], tell, commands)
-    except KeyboardInterrupt:
-        return "error", None
-    except Exception as raised:
+    except (KeyboardInterrupt, Exception) as raised:
         error = told_by(raised)
+        if isinstance(error, INTERRUPTS):
+            return "error", None
         if isinstance(error, OmnidynError):
             return "error", str(error)
         return "error", f"bug: {type(error).__name__}: {' '.join(str(error).split())}"
