@@ -132,17 +132,17 @@ def test_a_fit_goes_on_while_pages_answer_and_can_be_cancelled(browser, tmp_path
     other = browser.open(studio)
     choose_axebot(page)
     page.click("#fit:not([disabled])")
-    page.wait_for_selector("#cancel")
+    page.wait_for_selector("#cancel-fit")
     spent = [page.evaluate(ANSWER) for _ in range(9)]
     print(f"answers while a fit runs: {sorted(map(round, spent))} ms")
     assert sorted(spent)[4] < 200.0
-    assert page.is_visible("#cancel"), "the fit was over too soon"
+    assert page.is_visible("#cancel-fit"), "the fit was over too soon"
     page.reload()
     tab(page, "Fit")
-    page.wait_for_selector("#cancel")
+    page.wait_for_selector("#cancel-fit")
     tab(other, "Fit")
-    other.click("#cancel")
-    page.wait_for_selector("#cancel", state="detached")
+    other.click("#cancel-fit")
+    page.wait_for_selector("#cancel-fit", state="detached")
     page.wait_for_selector("#fit:not([disabled])")
     page.click("#fit")
     words = verdict(page, "#fit-verdict")

@@ -129,7 +129,7 @@ def test_what_is_free_is_chosen_and_a_cancelled_fit_keeps_the_best_so_far(browse
     page.click("#fit:not([disabled])")
     page.wait_for_function("document.querySelector('#fit-progress')?.innerText.includes(', step')")
     assert re.fullmatch(r"\d+ s", page.inner_text("#fit-time"))
-    page.click("#cancel")
+    page.click("#cancel-fit")
     assert "interrupted" in verdict(page, "#fit-verdict")
     assert "--free body.mass_kg" in page.text_content("#call")
     saved = tmp_path / "robot.toml"

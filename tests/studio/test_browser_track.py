@@ -162,7 +162,7 @@ def test_fits_are_compared_and_come_back_in_a_workspace(browser, tmp_path, monke
     heavier = Key.parse("friction.axes.coulomb[0]").set(omnidyn.load_robot("axebot"), 3.0)
     first, second = write_log("monday.csv", 12.0), write_log("tuesday.csv", 12.0, 2, robot=heavier)
     later = Path("later.toml")
-    assert command("identify", second, "--robot", "axebot", "-o", later, "--json")[1] == 0
+    assert command("identify", second, "--robot", "axebot", "--quick", "-o", later, "--json")[1] == 0
     studio, page = browser.start(first)
     choose_axebot(page)
     page.click("#fit:not([disabled])")
@@ -200,7 +200,7 @@ def test_fits_are_compared_and_come_back_in_a_workspace(browser, tmp_path, monke
     assert verdict(again, "#fit-verdict") == fit_words
     assert numbers(again) == fit_numbers
     again.click("#fit:not([disabled])")
-    again.wait_for_selector("#cancel")
+    again.wait_for_selector("#cancel-fit")
     again.wait_for_selector("#fit:not([disabled])")
     assert numbers(again) == fit_numbers
     tab(again, "Compare")

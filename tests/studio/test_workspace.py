@@ -15,9 +15,9 @@ import omnidyn
 from omnidyn.errors import InputError
 from omnidyn.studio import workspace
 from omnidyn.studio.calls import LogFile
-from omnidyn.studio.fit.state import Fit
 from omnidyn.studio.layout import Studio
 from omnidyn.studio.session import MAX_FILES, RefusedError
+from omnidyn.studio.task import Task
 
 LOG = {"name": "log.csv", "unsigned": True, "held_out": True, "file": "logs/1-log.csv", "map": ""}
 ROWS = b"t_s,vx_m_s\n0,1\n1,2\n"
@@ -73,7 +73,7 @@ def test_all_comes_back(make, tmp_path):
     session.logs["log2"] = LogFile("log2", "other.csv", str(files["other.csv"]), str(files["columns.toml"]), True)
     studio.fitting.hold_out(["log2"])
     session.add_robot(str(files["mine.toml"]), "mine.toml")
-    fit = Fit(result={"verdict": "Good.", "failed": False}, folder=tmp_path, command="rm -r x", python="x")
+    fit = Task(result={"verdict": "Good.", "failed": False}, folder=tmp_path, command="rm -r x", python="x")
     name = studio.fitting.keep(fit)
 
     async def again():

@@ -73,9 +73,9 @@ def progress(task: Task, cancel: Callable[[], Any], name: str) -> None:
         return
     with ui.row().classes("line"):
         ui.spinner(size="1.2em")
-        ui.label(task.progress)
+        ui.label(task.progress).props(f"id={name}-progress")
         left = "" if task.left is None else f", about {task.left:.0f} s left"
-        ui.label(f"{task.spent:.0f} s{left}").classes("quiet")
+        ui.label(f"{task.spent:.0f} s{left}").classes("quiet").props(f"id={name}-time")
         ui.button("Cancel", on_click=cancel).props(f"outline dense no-caps id=cancel-{name}")
     if task.share is not None:
         ui.linear_progress(task.share, show_value=False)

@@ -20,6 +20,7 @@ from omnidyn.arrays import FloatArray
 BLOCK = 64  # rows
 MAX_WIDTH = 8192  # pixels
 META = "meta.json"
+SERIES = "series"  # the folder in which a job writes the one series that it has
 SHOWN = np.float32  # numbers of a picture: fine for any number of pixels, at half the bytes
 
 

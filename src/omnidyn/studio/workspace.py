@@ -21,8 +21,9 @@ from typing import Any
 
 from omnidyn.errors import InputError
 from omnidyn.files import open_regular
-from omnidyn.studio.fit.state import Fit, Fitting
+from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.session import MAX_BYTES, MAX_FILE_BYTES, MAX_FILES, Session, safe_name
+from omnidyn.studio.task import Task
 
 SUFFIX, FILE_NAME = ".zip", "workspace.zip"
 SCHEMA, MANIFEST = 1, "manifest.json"
@@ -227,7 +228,7 @@ def adopt(space: Workspace, session: Session, fitting: Fitting) -> None:
     session.changed_all()
 
 
-def _fit(entry: Mapping[str, Any], files: Mapping[str, Path]) -> Fit:
+def _fit(entry: Mapping[str, Any], files: Mapping[str, Path]) -> Task:
     """A fit with its files in a folder, as the tab Fit shows it."""
     folder = files[entry["robot"]].parent
     for key, name in FIT_FILES.items():
@@ -244,7 +245,7 @@ def _fit(entry: Mapping[str, Any], files: Mapping[str, Path]) -> Fit:
         "remedies": [],
         "report": bool(entry["report"]),
     }
-    return Fit(result=shown, folder=folder)  # no command: one of a stranger would be run by hand
+    return Task(result=shown, folder=folder)  # no command: one of a stranger would be run by hand
 
 
 def _table(path: Path, columns: Sequence[str] = ()) -> dict[str, Sequence[Any]]:

@@ -21,6 +21,7 @@ from omnidyn.model.keys import EMF, ROTOR, TORQUE, Key, find_key, in_words, unit
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
 from omnidyn.studio.job import Tell, options_of, robot_of, timed, write_free_runs
+from omnidyn.studio.series import SERIES
 
 IDLE = 19  # of a process that waits for all others
 LOADED, COMPILED = 2, 8  # of the first runs: a simulation and a fit; those of the exact engine, seconds each
@@ -81,7 +82,7 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
         "warnings": warnings,
         "advice": [str(step) for step in result.advice],
         "remedies": _remedies(result),
-        "series": _write_free_run(result, folder / "series"),
+        "series": [SERIES] * _write_free_run(result, folder / SERIES),
     }
     shown["report"] = _write_report(result, request, folder / "report.html")
     return shown

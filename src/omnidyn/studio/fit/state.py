@@ -4,40 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from omnidyn.studio import calls
-from omnidyn.studio.parts import FIT, FREE, PROGRESS, ROBOT
-from omnidyn.studio.series import Series
+from omnidyn.studio.parts import FIT, FREE, ROBOT
 from omnidyn.studio.session import Session
+from omnidyn.studio.task import Task
 from omnidyn.studio.worker import CancelledError, JobError
-
-
-@dataclass
-class Fit:
-    """A fit. result: of the job. running, progress, share, spent, left [s]: while it goes on. folder: of its files."""
-
-    result: dict[str, Any] | None = None
-    error: str = ""
-    running: bool = False
-    progress: str = ""
-    share: float | None = None
-    spent: float = 0.0
-    left: float | None = None
-    folder: Path | None = None
-    series: str = ""
-    command: str = ""
-    python: str = ""
 
 
 class Fitting:
     """The last fit, all that gave a robot by the name of its file, and the keys of the logs that are held out."""
 
     def __init__(self, session: Session) -> None:
-        self.session, self.last = session, Fit()
-        self.fits: dict[str, Fit] = {}
+        self.session, self.last = session, Task()
+        self.fits: dict[str, Task] = {}
         self._held_out: list[str] = []
         self.choices: dict[str, Any] = {"default": [], "others": []}  # what can be free of the robot `_choices_of`
         self.free: list[str] = []
@@ -105,40 +86,23 @@ class Fitting:
                 self.choices["others"].append([added, added])
             self.session.changed(FREE)
         free = self.free_keys
-        folder = self.session.new_folder() / "fit"
-        self.session.series.pop(self.last.series, None)
         logs, held_out = [*self.session.logs.values()], [self.session.logs[key] for key in self.held_out]
         command, python = calls.fit(logs, held_out, self.session.robot_path, free)
-        self.last = fit = Fit(running=True, folder=folder, progress="...", command=command, python=python)
-        self.session.changed(FIT)
-
-        def listen(kind: str, value: Any) -> None:
-            fit.progress, fit.share, fit.spent, fit.left = (value[k] for k in ("text", "share", "spent", "left"))
-            self.session.changed(PROGRESS)
-
+        self.last.end(self.session)
+        self.last = fit = Task(command=command, python=python)
         request = {
             "robot": self.session.robot_path,
-            "logs": [log.request for log in self.session.logs.values()],
-            "hold_out": [self.session.logs[key].path for key in self.held_out],
+            "logs": [log.request for log in logs],
+            "hold_out": [log.path for log in held_out],
             "free": free,
-            "folder": str(folder),
             "command": command,
         }
         self.session.workers["fit"].send({"command": "fit"})  # what warms up makes way
-        try:
-            fit.result = await self.session.workers["fit"].run("fit", request, listen)
+        await fit.run(self.session, FIT, "fit", "fit", request)
+        if fit.result is not None:
             self.keep(fit)
-            if fit.result is not None and fit.result["series"]:
-                fit.series = f"fit{self.session.count}"
-                self.session.series[fit.series] = Series(folder / "series")
-        except JobError as error:
-            fit.error = str(error)
-        except CancelledError:
-            fit.error = ""
-        fit.running = False
-        self.session.changed(FIT)
 
-    def keep(self, fit: Fit, name: str = "") -> str:
+    def keep(self, fit: Task, name: str = "") -> str:
         """Let all tabs take the robot of a fit, under this name or the next free one, which is returned."""
         assert fit.folder is not None
         name = self.session.free_name(name or f"fit-{len(self.fits) + 1}.toml")

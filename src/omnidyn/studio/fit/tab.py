@@ -7,10 +7,12 @@ from collections.abc import Callable
 from nicegui import ui
 
 from omnidyn.model.wheels import ROBOT_RADII, WHEEL_RADII
-from omnidyn.studio.elements import plot, table, verdict
+from omnidyn.studio.elements import plot, progress, table, verdict
 from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.page import Page
-from omnidyn.studio.parts import FIT, FREE, LOGS, PROGRESS, ROBOT
+from omnidyn.studio.parts import FIT, FREE, LOGS, ROBOT
+from omnidyn.studio.series import SERIES
+from omnidyn.studio.task import progress_of
 
 WHY = {
     "no_log": "Add a log first: tab Log.",
@@ -39,7 +41,7 @@ class FitTab:
             self._robot_form()
         self.page.part(self._choices, FREE, LOGS, ROBOT)
         self.page.part(self._start, FIT, LOGS)
-        self.page.part(self._progress, FIT, PROGRESS)
+        self.page.part(self._progress, FIT, progress_of(FIT))
         self.page.part(self._result, FIT)
 
     def _robot_form(self) -> None:
@@ -123,19 +125,7 @@ class FitTab:
             ).classes("wide free").props("use-chips")
 
     def _progress(self) -> None:
-        fit = self.fitting.last
-        if not fit.running:
-            return
-        with ui.row().classes("line"):
-            ui.spinner(size="1.2em")
-            ui.label(fit.progress).props("id=fit-progress")
-            left = "" if fit.left is None else f", about {fit.left:.0f} s left"
-            ui.label(f"{fit.spent:.0f} s{left}").classes("quiet").props("id=fit-time")
-            ui.button("Cancel", on_click=lambda: self.session.start(self.session.workers["fit"].cancel())).props(
-                "outline dense no-caps id=cancel"
-            )
-        if fit.share is not None:
-            ui.linear_progress(fit.share, show_value=False)
+        progress(self.fitting.last, lambda: self.session.start(self.session.workers["fit"].cancel()), "fit")
 
     def _result(self) -> None:
         fit = self.fitting.last
@@ -160,9 +150,9 @@ class FitTab:
                 ).props("outline dense no-caps")
         for words in result["advice"]:
             ui.label(f"→ {words}").classes("text")
-        if fit.series:
+        if SERIES in fit.series:
             ui.label("Free run: the model gets the inputs only").classes("title")
-            plot(fit.series, [], "free-run.png")
+            plot(fit.series[SERIES], [], "free-run.png")
         with self.page.box(f"Warnings and notes ({len(result['warnings'])})"):
             for warning in result["warnings"]:
                 ui.label(f"{warning['severity']}: {warning['text']}").classes("text")

@@ -20,9 +20,9 @@ from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
 from omnidyn.report.figures.robot import wheel_lines, wheel_places
 from omnidyn.studio.job import Tell, robot_of, shown, timed
-from omnidyn.studio.series import write_series
+from omnidyn.studio.series import SERIES, write_series
 
-DRAWN, MOTION, SERIES = "drawn.csv", "motion.json", "series"
+DRAWN, MOTION = "drawn.csv", "motion.json"
 MAX_FRAMES = 3000  # of the animation
 
 

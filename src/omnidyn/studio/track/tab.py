@@ -12,8 +12,9 @@ from omnidyn.control.paths.path import OPTIONS
 from omnidyn.studio.elements import document, plot, progress, verdict
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import PATH, ROBOT, TRACK, TRACK_START
+from omnidyn.studio.series import SERIES
 from omnidyn.studio.task import progress_of
-from omnidyn.studio.track.job import DRAWN, SERIES
+from omnidyn.studio.track.job import DRAWN
 from omnidyn.studio.track.state import Tracks
 
 WHY = {
