@@ -15,7 +15,7 @@ from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say, width
-from omnidyn.cli.terminal.telling import tell
+from omnidyn.cli.terminal.telling import FAILED, tell
 from omnidyn.files import check_output
 from omnidyn.progress import Report
 
@@ -129,3 +129,5 @@ def align(
         alignment = omnidyn.align(*(log.to_run(sort=flags.sort) for log in logs))
     inputs = [{"role": "log", "name": log.source, "sha256": log.sha256} for log in logs]
     tell(alignment.document(), json, provenance([*([robot_input(robot)] if robot else []), *inputs]))
+    if not alignment.is_alike:
+        raise typer.Exit(FAILED)

@@ -100,12 +100,12 @@ def _taken_differently(statement: Statement) -> str:
 
 SENTENCES = {
     "logs_aligned": Sentence(
-        "{subject} shows the motion of {first} when {offset:+.4f} s are added to its times: correlation "
+        "with {offset:+.4f} s added to its times {subject} shows the motion of {first}: correlation "
         "{correlation:.2f} of {components} over {overlap:.4g} s"
     ),
     "logs_unlike": Sentence(
-        "{subject} and {first} hardly show one motion: correlation {correlation:.2f} of {components} at best, with "
-        "{offset:+.4f} s added to the times of {subject}",
+        "the logs {subject} and {first} hardly show one motion: correlation {correlation:.2f} of {components} at best, "
+        "with {offset:+.4f} s added to the times of {subject}",
         "give two recordings of one drive",
     ),
     "applied": Sentence(_applied),
