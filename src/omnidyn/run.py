@@ -15,7 +15,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.clocks import fastest_step, has_own_clock, is_staggered, samples, usual_step
 from omnidyn.document import Document, Points, Table
 from omnidyn.errors import InputError
-from omnidyn.shown import ANIMATION, DATASET, FIGURE, FRAME, RUN, Animation, Displayable, make
+from omnidyn.shown import ANIMATION, DATASET, FIGURE, FRAME, RUN, Displayable, make
 from omnidyn.statement import Statement, statements
 
 if TYPE_CHECKING:
@@ -177,7 +177,7 @@ class Run(Displayable):
         """
         return make(FIGURE, self, path=True, robot=robot)
 
-    def animate(self, robot: Any) -> Animation:
+    def animate(self, robot: Any) -> Any:
         """The robot on its way, from above and to scale, as an Animation: `.save("run.gif")`; a notebook shows it.
 
         robot: that is drawn. Raises InputError for a run that holds no pose, twist or wheel speeds of this robot.

@@ -8,14 +8,8 @@ called.
 
 from __future__ import annotations
 
-import base64
-import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
-
-from omnidyn.errors import InputError
-from omnidyn.files import write_atomic
 
 if TYPE_CHECKING:
     from omnidyn.document import Document
@@ -53,20 +47,3 @@ class Displayable:
     def _repr_html_(self) -> str:
         """What a notebook shows."""
         return make(HTML, self.document())
-
-
-@dataclass(frozen=True)
-class Animation:
-    """A moving picture. gif: the bytes of a GIF that repeats. A notebook shows it."""
-
-    gif: bytes = field(repr=False)
-
-    def save(self, path: str | os.PathLike, force: bool = False) -> None:
-        """Write it as a file `.gif`. Raises InputError for another ending, or where it exists, unless `force`."""
-        if not os.fspath(path).lower().endswith(".gif"):
-            raise InputError("another kind of file", got=os.fspath(path), expected="a name that ends in .gif")
-        write_atomic(path, self.gif, force)
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows."""
-        return f'<img alt="animation" src="data:image/gif;base64,{base64.b64encode(self.gif).decode()}">'

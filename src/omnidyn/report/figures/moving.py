@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import math
+import os
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
+from omnidyn.files import write_atomic
 from omnidyn.logs.path import path_of
 from omnidyn.model.robot import Robot
 from omnidyn.report.figures.robot import wheel_lines, wheel_places
 from omnidyn.report.figures.tracking import COLOURS
 from omnidyn.run import Run
-from omnidyn.shown import Animation
 
 SIZE, MARGIN, TEXT = 480, 16, 20  # pixels
 OVERSAMPLING = 2  # drawn so many times larger, then made small: lines are smooth
@@ -25,6 +28,23 @@ FRAME, MOST_FRAMES = 0.05, 240  # [s] of the run to a frame; longer runs go fast
 TAIL = 1.0  # [s] of its way that a robot draws behind it
 BODY_SHARE = 0.85  # of the distance of the outermost wheel: the circle that stands for the body
 PALE, INK, WAY = (236, 236, 236), (34, 34, 34), (178, 178, 178)
+
+
+@dataclass(frozen=True)
+class Animation:
+    """A moving picture. gif: the bytes of a GIF that repeats. A notebook shows it."""
+
+    gif: bytes = field(repr=False)
+
+    def save(self, path: str | os.PathLike, force: bool = False) -> None:
+        """Write it as a file `.gif`. Raises InputError for another ending, or where it exists, unless `force`."""
+        if not os.fspath(path).lower().endswith(".gif"):
+            raise InputError("another kind of file", got=os.fspath(path), expected="a name that ends in .gif")
+        write_atomic(path, self.gif, force)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        return f'<img alt="animation" src="data:image/gif;base64,{base64.b64encode(self.gif).decode()}">'
 
 
 def animate(run: Run, robot: Robot) -> Animation:
