@@ -10,7 +10,7 @@ import pytest
 
 import omnidyn
 from omnidyn.model.keys import Key
-from tests.support.pages import as_flags, choose_axebot, command, drop, numbers, shown, tab, verdict, write_log
+from tests.support.pages import as_flags, choose_axebot, command, drop, numbers, pick, shown, tab, verdict, write_log
 
 # How long the server takes to answer a click [ms]: it turns the page dark, or light again
 ANSWER = """() => new Promise(done => { const begun = performance.now();
@@ -115,7 +115,7 @@ def test_columns_corrected_by_hand(browser, tmp_path):
     page.get_by_text("Columns and units").click()
     for column, component in (("foo", "vx"), ("bar", "vy")):
         page.get_by_label(f"{column} is").click()
-        page.get_by_role("option", name=component, exact=True).click()
+        pick(page, component)
         page.get_by_label(f"unit of {column}").fill("m/s")
     page.click("#apply-columns")
     page.get_by_text("Save this map").wait_for()

@@ -8,7 +8,7 @@ import pytest
 import omnidyn
 from omnidyn.model.keys import Key, find_key
 from tests.support.axebot_logs import excitation
-from tests.support.pages import command, drop, shown, tab, verdict
+from tests.support.pages import command, drop, numbers, pick, shown, tab, verdict
 from tests.support.pushed_logs import clean_log
 
 
@@ -24,21 +24,14 @@ def cut(path, begin, every, seed):
 def choose(page, name, option):
     """Choose of a list."""
     page.click(f"#{name}")
-    page.get_by_role("option", name=option, exact=True).click()
+    pick(page, option)
 
 
 def choose_robot(page, name):
     """Choose the robot to start from."""
     tab(page, "Fit")
     page.click(".robot")
-    page.get_by_role("option", name=name, exact=True).click()
-
-
-def numbers(page):
-    """Key -> value of the table of a fit."""
-    rows = page.locator("#numbers tbody tr").all()
-    cells = [[cell.inner_text().strip() for cell in row.locator("td").all()] for row in rows]
-    return {row[1]: row[2] for row in cells}
+    pick(page, name)
 
 
 def test_two_logs_are_put_on_one_time_axis(browser, tmp_path):

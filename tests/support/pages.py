@@ -55,11 +55,17 @@ def as_flags(text):
     return re.sub(r"`([a-z_]+)`", lambda match: f"--{match[1].replace('_', '-')}", text)
 
 
+def pick(page, option):
+    """Take an option of the list that is open, and wait until the list is gone."""
+    page.get_by_role("option", name=option, exact=True).click()
+    page.wait_for_function("!document.querySelector('[role=option]')")
+
+
 def choose_axebot(page):
     """Choose the robot to start from."""
     tab(page, "Fit")
     page.click(".robot")
-    page.get_by_role("option", name="axebot", exact=True).click()
+    pick(page, "axebot")
 
 
 def numbers(page):
