@@ -32,7 +32,7 @@ class Worker:
     def __init__(self) -> None:
         self._process: asyncio.subprocess.Process | None = None
         self._lock = asyncio.Lock()
-        self.busy = False
+        self.busy = self._is_cancelled = False
 
     async def run(self, job: str, request: Any, listen: Listener) -> Any:
         """The result of a job, when those before it are done. listen: gets each kind of message and what it holds.
@@ -40,7 +40,7 @@ class Worker:
         Raises JobError with the words of an error, CancelledError for a job that was cancelled without a result.
         """
         async with self._lock:
-            self.busy = True
+            self.busy, self._is_cancelled = True, False
             try:
                 return await self._result(await self._started(), job, request, listen)
             finally:
@@ -71,8 +71,8 @@ class Worker:
             for kind, value in json.loads(line).items():
                 if kind == "result":
                     return value
-                if kind == "error":
-                    raise (CancelledError if value is None else JobError)(value)
+                if kind == "error":  # whatever an interrupt did to a job, it is the end that was asked for
+                    raise (CancelledError if value is None or self._is_cancelled else JobError)(value)
                 listen(kind, value)
         raise CancelledError
 
@@ -87,6 +87,7 @@ class Worker:
         if not self.busy:
             return
         process = self._process
+        self._is_cancelled = True
         self.send({"cancel": True})
         for _ in range(int(GRACE / 0.1)):
             await asyncio.sleep(0.1)
