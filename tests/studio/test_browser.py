@@ -145,6 +145,9 @@ def test_a_fit_goes_on_while_pages_answer_and_can_be_cancelled(browser, tmp_path
     page.wait_for_selector("#cancel-fit", state="detached")
     page.wait_for_selector("#fit:not([disabled])")
     page.click("#fit")
+    whole = "document.querySelector('#fit-verdict')?.innerText.includes('interrupted') === false"  # the new one
+    page.wait_for_function(whole)
+    other.wait_for_function(whole)
     words = verdict(page, "#fit-verdict")
     assert verdict(other, "#fit-verdict") == words
     assert_same_numbers(page, path)
