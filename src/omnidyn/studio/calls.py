@@ -51,9 +51,14 @@ class LogFile:
 
     @property
     def python(self) -> str:
-        """How Python reads it so."""
+        """How Python reads it so, faults and all where it is read as it stands."""
+        return self.run_python if self.flags else f"omnidyn.load_log({self.name!r})"
+
+    @property
+    def run_python(self) -> str:
+        """How Python makes a Run of it."""
         words = [f", columns={MAP!r}"] * bool(self.map) + [", current_unsigned=True"] * self.unsigned
-        return f"omnidyn.{'read_log' if words else 'load_log'}({self.name!r}{''.join(words)})"
+        return f"omnidyn.read_log({self.name!r}{''.join(words)})"
 
 
 def check(log: LogFile, robot: str) -> tuple[str, str]:
@@ -68,8 +73,7 @@ def align(log: LogFile, other: LogFile, robot: str) -> tuple[str, str]:
     name = Path(robot).name if robot else ""
     flags = max((log.flags, other.flags), key=len)
     words = ["omnidyn", "align", log.name, other.name, *(["--robot", name] if name else []), *flags]
-    first, second = (one.python.replace("load_log(", "read_log(") for one in (log, other))
-    return shlex.join(words), f"omnidyn.align({first}, {second}).offset"
+    return shlex.join(words), f"omnidyn.align({log.run_python}, {other.run_python}).offset"
 
 
 def fit(logs: Sequence[LogFile], held_out: Sequence[LogFile], robot: str, free: Sequence[str]) -> tuple[str, str]:

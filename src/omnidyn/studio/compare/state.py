@@ -79,7 +79,7 @@ class Comparing:
         words = ["omnidyn", "compare", *(log.name for log in self.logs)]
         words += [word for name in robots for word in ("--robot", name)]
         words += max((log.flags for log in self.logs), key=len)
-        logs = ", ".join(log.python.replace(", current_unsigned=True", "") for log in self.logs)
+        logs = ", ".join(log.run_python.replace(", current_unsigned=True", "") for log in self.logs)
         first, *others = (f"omnidyn.load_robot({name!r})" for name in robots)
         more = "".join(f", {other}" for other in others)
         more += ", current_unsigned=True" * any(log.unsigned for log in self.logs)
@@ -98,12 +98,16 @@ class Comparing:
         }
         await self.last.run(self.session, COMPARE, COMPARE, "compare", request)
 
+    def drift_calls(self) -> tuple[str, str]:
+        """The command line and the Python call that compare the fits with each other."""
+        names = [Path(name).name for name in self.fits]
+        return shlex.join(["omnidyn", "drift", *names]), f"omnidyn.drift({names!r})"
+
     async def run_drift(self) -> None:
         """Compare the fits with each other."""
         if self.last_drift.running:
             return
-        names = [Path(name).name for name in self.fits]
-        command = shlex.join(["omnidyn", "drift", *names])
-        self.last_drift = Task(command=command, python=f"omnidyn.drift({names!r})")
+        command, python = self.drift_calls()
+        self.last_drift = Task(command=command, python=python)
         request = {"fits": [self.session.robots[name] for name in self.fits], "names": self.fits}
         await self.last_drift.run(self.session, DRIFT, COMPARE, "drift", request)
