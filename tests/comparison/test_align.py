@@ -63,6 +63,16 @@ def test_two_drives_are_unlike_and_two_logs_without_a_common_channel_are_refused
         omnidyn.align(one, two)
 
 
+def test_a_motion_that_repeats_itself_fits_at_several_offsets():
+    t, draws = np.arange(0.0, 30.0, 0.01), np.random.default_rng(3)
+    waves = np.sin(np.pi * t)  # a period of 2 s
+    twist = np.stack([waves, 0.5 * waves, np.zeros_like(t)], axis=1) + 0.01 * draws.standard_normal((len(t), 3))
+    found = omnidyn.align(omnidyn.Run(t=t, twist=twist), omnidyn.Run(t=t[530:] - t[530], twist=twist[530:]))
+    assert found.correlation > 0.9
+    assert codes([found.verdict]) == ["logs_aligned_in_several_ways"]
+    assert abs(found.offset - found.rival_offset) == pytest.approx(2.0, abs=0.03)
+
+
 def test_the_command_prints_the_offset(fine, tmp_path, monkeypatch, capsys):
     from omnidyn.cli import main
 

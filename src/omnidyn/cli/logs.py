@@ -129,5 +129,5 @@ def align(
         alignment = omnidyn.align(*(log.to_run(sort=flags.sort) for log in logs))
     inputs = [{"role": "log", "name": log.source, "sha256": log.sha256} for log in logs]
     tell(alignment.document(), json, provenance([*([robot_input(robot)] if robot else []), *inputs]))
-    if not alignment.is_alike:
+    if not (alignment.is_alike and alignment.is_unique):
         raise typer.Exit(FAILED)

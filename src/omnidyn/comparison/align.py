@@ -28,6 +28,7 @@ from omnidyn.statement import NOTE, WARNING, Statement, as_verdict
 MAX_POINTS = 2**23  # of a grid that both logs are put on
 SMOOTH_STEPS = 5  # of the slower log, over which both are averaged, twice
 LEAST_ALIKE = 0.7  # correlation below which two logs hardly show one motion
+LARGEST_RIVAL = 0.9  # of the correlation, that another offset may reach: a motion that repeats itself fits at several
 RATES_MEASURED = ("twist", "wheel_speed")
 RATES = {"heading": "omega", "a": "w"}  # what the slope of a component is, by its letters
 
@@ -37,12 +38,15 @@ class Alignment:
     """Where a second log stands on the clock of a first.
 
     offset: to be added to the times of the second [s]. correlation: of both, where they overlap, -1 to 1. overlap: how
-    long they do [s]. components: that both have, by which they were aligned. first, second: where they come from.
+    long they do [s]. rival_offset, rival: the best of the other offsets, and its correlation; -1 where there is none.
+    components: that both have, by which they were aligned. first, second: where they come from.
     """
 
     offset: float
     correlation: float
     overlap: float
+    rival_offset: float
+    rival: float
     components: tuple[str, ...]
     first: str = ""
     second: str = ""
@@ -53,19 +57,32 @@ class Alignment:
         return self.correlation >= LEAST_ALIKE
 
     @property
+    def is_unique(self) -> bool:
+        """Whether no other offset fits nearly as well."""
+        return self.rival < LARGEST_RIVAL * self.correlation
+
+    @property
     def verdict(self) -> Statement:
         """By how much the second log is later, or that the two hardly show one motion."""
         numbers = {name: getattr(self, name) for name in ("offset", "correlation", "overlap", "components", "first")}
-        if self.is_alike:
-            return Statement("logs_aligned", NOTE, self.second, numbers)
-        return Statement("logs_unlike", WARNING, self.second, numbers)
+        if not self.is_alike:
+            return Statement("logs_unlike", WARNING, self.second, numbers)
+        if not self.is_unique:
+            numbers |= {"rival_offset": self.rival_offset, "rival": self.rival}
+            return Statement("logs_aligned_in_several_ways", WARNING, self.second, numbers)
+        return Statement("logs_aligned", NOTE, self.second, numbers)
 
     def document(self) -> Document:
         """The offset in a sentence, and as values."""
         data = plain({**as_verdict(self.verdict), **vars(self)})
         cells = f"{self.offset:.6f}", f"{self.correlation:.3f}", f"{self.overlap:.4g}", " ".join(self.components)
         heads = "offset [s]", "correlation", "overlap [s]", "by"
-        return Document([Table(heads, [cells])], data, () if self.is_alike else (self.verdict,), verdict=self.verdict)
+        return Document(
+            [Table(heads, [cells])],
+            data,
+            () if self.is_alike and self.is_unique else (self.verdict,),
+            verdict=self.verdict,
+        )
 
 
 def align(first: Run, second: Run) -> Alignment:
@@ -86,12 +103,16 @@ def align(first: Run, second: Run) -> Alignment:
         np.array([_on_grid(*of_run[name], grid, width) for name in names])
         for of_run, grid in zip(signals, grids, strict=True)
     )
-    k = _best_shift(x, y)
+    k, rivals = _best_shifts(x, y)
     (before, _), (peak, overlap), (after, _) = (_alike(x, y, shift) for shift in (k - 1, k, k + 1))
     bend = before - 2.0 * peak + after
     shift = k + (0.5 * (before - after) / bend if bend < 0.0 else 0.0)
-    offset = float(grids[0][0] - grids[1][0] + shift * step)
-    return Alignment(offset, peak, overlap * step, names, runs[0].source, runs[1].source)
+    begin = float(grids[0][0] - grids[1][0])
+    rival, other = max(((_alike(x, y, one)[0], one) for one in rivals), default=(-1.0, k))
+    first_name, second_name = runs[0].source or "the first log", runs[1].source or "the second log"
+    return Alignment(
+        begin + shift * step, peak, overlap * step, begin + other * step, rival, names, first_name, second_name
+    )
 
 
 Signals = dict[str, tuple[FloatArray, FloatArray]]
@@ -136,14 +157,22 @@ def _on_grid(t: FloatArray, values: FloatArray, grid: FloatArray, width: int) ->
     return smooth[width:-width] if len(smooth) > 4 * width else smooth
 
 
-def _best_shift(x: FloatArray, y: FloatArray) -> int:
-    """Steps by which y has to be moved to be most like x. Shapes (components, n) and (components, m)."""
+def _best_shifts(x: FloatArray, y: FloatArray) -> tuple[int, list[int]]:
+    """Steps by which y has to be moved to be most like x, and the next best to each side, beyond where both are unlike.
+
+    Shapes (components, n) and (components, m).
+    """
     size = int(next_fast_len(x.shape[1] + y.shape[1] - 1, real=True) or 0)
     spectra = (rfft(one, size) * np.conj(rfft(other, size)) for one, other in zip(x, y, strict=True))
     spectrum = np.sum(list(spectra), axis=0)
     products = irfft(spectrum, size)
-    k = int(np.argmax(products))
-    return k if k < x.shape[1] else k - size
+    products = np.concatenate([products[size - y.shape[1] + 1 :], products[: x.shape[1]]])  # from the least shift on
+    k, least = int(np.argmax(products)), y.shape[1] - 1
+    unlike = np.flatnonzero(products <= 0.0)
+    sides = products[: unlike[unlike < k].max(initial=0)], products[unlike[unlike > k].min(initial=len(products)) :]
+    begins = 0, len(products) - len(sides[1])
+    rivals = [begin + int(np.argmax(side)) for begin, side in zip(begins, sides, strict=True) if len(side)]
+    return k - least, [one - least for one in rivals]
 
 
 def _alike(x: FloatArray, y: FloatArray, shift: int) -> tuple[float, int]:

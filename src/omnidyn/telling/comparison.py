@@ -103,6 +103,11 @@ SENTENCES = {
         "with {offset:+.4f} s added to its times {subject} shows the motion of {first}: correlation "
         "{correlation:.2f} of {components} over {overlap:.4g} s"
     ),
+    "logs_aligned_in_several_ways": Sentence(
+        "the motion of {subject} repeats itself: it is that of {first} with {offset:+.4f} s added to its times "
+        "(correlation {correlation:.2f}), and nearly as well with {rival_offset:+.4f} s ({rival:.2f})",
+        "align logs of a drive that does not repeat itself, or choose the offset by hand",
+    ),
     "logs_unlike": Sentence(
         "the logs {subject} and {first} hardly show one motion: correlation {correlation:.2f} of {components} at best, "
         "with {offset:+.4f} s added to the times of {subject}",
