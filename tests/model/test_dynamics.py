@@ -9,7 +9,15 @@ from scipy.linalg import expm
 
 import omnidyn
 from omnidyn.errors import InputError
-from omnidyn.model.dynamics import acceleration, discretise, drive_wrench, frame_wrench, is_decoupled, state_space
+from omnidyn.model.dynamics import (
+    acceleration,
+    discretise,
+    drive_wrench,
+    frame_wrench,
+    friction_wrench,
+    is_decoupled,
+    state_space,
+)
 from omnidyn.model.friction import Friction
 from tests.support.robots import random_robot, robot_of
 
@@ -199,3 +207,14 @@ def test_a_disc_of_friction_turns_with_the_direction_of_travel():
         omnidyn.state_space(robot, twist=[[0.0, 0.0, 0.0]])
     with pytest.raises(InputError, match=r"no operating point; got \[nan, 0.0, 0.0\]; expected finite numbers"):
         omnidyn.state_space(robot, twist=[np.nan, 0.0, 0.0])
+
+
+def test_wrench_of_friction_is_that_of_its_law_in_motion_and_balances_the_motors_at_rest():
+    robot = omnidyn.load_robot("axebot")
+    robot = robot.replace(body=robot.body.replace(rotating_frame=True))  # its terms are no friction
+    twist, axes = np.array([0.4, -0.3, 2.0]), robot.friction.axes
+    law = -(np.array(axes.viscous) * twist + np.array(axes.coulomb) * np.sign(twist))
+    assert friction_wrench(robot, twist, [1.0, 2.0, -1.0]) == pytest.approx(law, rel=1e-12)
+    at_rest = friction_wrench(robot, np.zeros(3), [0.0, 0.1, -0.1])
+    assert at_rest == pytest.approx(-drive_wrench(robot, np.zeros(3), [0.0, 0.1, -0.1]), abs=1e-12)
+    assert at_rest[0] < -0.1

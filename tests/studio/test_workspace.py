@@ -154,6 +154,13 @@ def test_a_bad_one_is_refused_and_leaves_nothing(make, tmp_path, words):
     assert not list(tmp_path.glob("**/evil"))
 
 
+def test_the_list_of_files_is_bounded_before_it_is_read(tmp_path):
+    path = tmp_path / "bad.zip"
+    path.write_bytes(BAD["many files"])
+    with pytest.raises(InputError, match=f"got {4 * MAX_FILES + 1} files; expected at most {4 * MAX_FILES} files"):
+        workspace.read(path)
+
+
 def test_a_good_one_and_one_too_many(make, tmp_path):
     path = tmp_path / "good.zip"
     path.write_bytes(GOOD)
