@@ -10,7 +10,19 @@ import pytest
 
 import omnidyn
 from omnidyn.model.keys import Key
-from tests.support.pages import as_flags, choose_axebot, command, drop, numbers, pick, shown, tab, verdict, write_log
+from tests.support.pages import (
+    as_flags,
+    choose_axebot,
+    command,
+    drop,
+    load_again,
+    numbers,
+    pick,
+    shown,
+    tab,
+    verdict,
+    write_log,
+)
 
 # How long the server takes to answer a click [ms]: it turns the page dark, or light again
 ANSWER = """() => new Promise(done => { const begun = performance.now();
@@ -137,7 +149,7 @@ def test_a_fit_goes_on_while_pages_answer_and_can_be_cancelled(browser, tmp_path
     print(f"answers while a fit runs: {sorted(map(round, spent))} ms")
     assert sorted(spent)[4] < 200.0
     assert page.is_visible("#cancel-fit"), "the fit was over too soon"
-    page.reload()
+    load_again(page)
     tab(page, "Fit")
     page.wait_for_selector("#cancel-fit")
     tab(other, "Fit")

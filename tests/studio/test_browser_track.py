@@ -8,7 +8,7 @@ import pytest
 
 import omnidyn
 from omnidyn.model.keys import Key
-from tests.support.pages import choose_axebot, command, numbers, shown, tab, verdict, write_log
+from tests.support.pages import choose_axebot, command, load_again, numbers, shown, tab, verdict, write_log
 
 
 def choose(page, name, *options):
@@ -72,13 +72,13 @@ def test_controllers_side_by_side(browser, tmp_path):
     page.get_by_text("The same by hand").last.click()
     call = "omnidyn track axebot --path eight:size_m=0.4 --controller pid --controller mpc"
     assert page.inner_text("#call-track") == call
-    page.reload()
+    load_again(page)
     tab(page, "Track")
     assert verdict(page, "#track-verdict") == said["verdict"]
     page.get_by_label("rounds").fill("900")
     page.click("#track:not([disabled])")
     page.get_by_text(re.compile(r"tracking with pid, [1-9]\d* %")).wait_for()
-    page.click("#cancel-track")
+    page.click("#cancel-track", delay=500)  # as a hand does: longer than the words beside it stand
     page.wait_for_selector("#cancel-track", state="detached")
     page.wait_for_selector("#track:not([disabled])")
     assert not page.is_visible("#track-verdict")

@@ -55,6 +55,12 @@ def as_flags(text):
     return re.sub(r"`([a-z_]+)`", lambda match: f"--{match[1].replace('_', '-')}", text)
 
 
+def load_again(page):
+    """Load the page anew, as a user who waits until something is there."""
+    page.reload()
+    page.wait_for_selector("#example")
+
+
 def pick(page, option):
     """Take an option of the list that is open, and wait until the list is gone."""
     page.get_by_role("option", name=option, exact=True).click()

@@ -10,7 +10,6 @@ from nicegui import ui
 
 from omnidyn.logs.channels import components
 from omnidyn.run import CHANNELS
-from omnidyn.studio.task import Task
 
 UNUSED = "-"  # what a column is that nobody takes
 MARK = {"error": "✕", "warning": "!", "note": "i"}
@@ -65,20 +64,6 @@ def document(parts: list[dict[str, Any]], name: str) -> None:
             ui.label(f"{severity}: {words}" if severity else words).classes("text")
         if "text" in part:
             ui.label(part["text"]).classes("text quiet")
-
-
-def progress(task: Task, cancel: Callable[[], Any], name: str) -> None:
-    """How far a task is, and what cancels it."""
-    if not task.running:
-        return
-    with ui.row().classes("line"):
-        ui.spinner(size="1.2em")
-        ui.label(task.progress).props(f"id={name}-progress")
-        left = "" if task.left is None else f", about {task.left:.0f} s left"
-        ui.label(f"{task.spent:.0f} s{left}").classes("quiet").props(f"id={name}-time")
-        ui.button("Cancel", on_click=cancel).props(f"outline dense no-caps id=cancel-{name}")
-    if task.share is not None:
-        ui.linear_progress(task.share, show_value=False)
 
 
 def _component_names() -> list[str]:

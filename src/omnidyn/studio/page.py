@@ -8,6 +8,8 @@ from typing import Any
 from nicegui import ui
 
 from omnidyn.studio.session import Session
+from omnidyn.studio.task import Task, progress_of
+from omnidyn.studio.worker import Worker
 
 
 class Page:
@@ -42,6 +44,36 @@ class Page:
         is_open = self.folded.get(name, is_open)
         box = ui.expansion(title, value=is_open, on_value_change=lambda event: self.folded.update({name: event.value}))
         return box.classes("box")
+
+    def progress(self, part: str, task: Callable[[], Task], worker: Worker) -> None:
+        """How far the task of a part is, and a button that cancels it.
+
+        The button stays the same while the words beside it change: a click takes longer than they stand.
+        """
+
+        def words() -> None:
+            if task().running:
+                left = "" if task().left is None else f", about {task().left:.0f} s left"
+                with ui.row().classes("line"):
+                    ui.spinner(size="1.2em")
+                    ui.label(task().progress).props(f"id={part}-progress")
+                    ui.label(f"{task().spent:.0f} s{left}").classes("quiet").props(f"id={part}-time")
+
+        def button() -> None:
+            if task().running:
+                ui.button("Cancel", on_click=lambda: self.session.start(worker.cancel())).props(
+                    f"outline dense no-caps id=cancel-{part}"
+                )
+
+        def bar() -> None:
+            share = task().share
+            if task().running and share is not None:
+                ui.linear_progress(share, show_value=False)
+
+        with ui.row().classes("line"):
+            self.part(words, part, progress_of(part))
+            self.part(button, part)
+        self.part(bar, part, progress_of(part))
 
     def robot_choice(self) -> None:
         """The robot of the session, and a place to drop a robot file."""

@@ -8,10 +8,9 @@ from nicegui import ui
 
 from omnidyn.studio.compare.job import PICTURE
 from omnidyn.studio.compare.state import FIT, Comparing
-from omnidyn.studio.elements import document, plot, progress, verdict
+from omnidyn.studio.elements import document, plot, verdict
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import COMPARE, COMPARE_START, DRIFT, LOGS, ROBOT
-from omnidyn.studio.task import progress_of
 
 WHY = {"no_robot": "Choose a robot first.", "no_log": "Add a log first: tab Log."}
 
@@ -27,12 +26,12 @@ class CompareTab:
         page = self.page
         page.part(self._choice, LOGS, ROBOT)
         page.part(self._start, COMPARE, COMPARE_START, LOGS, ROBOT)
-        page.part(lambda: self._progress(COMPARE), COMPARE, progress_of(COMPARE))
+        page.progress(COMPARE, lambda: self.comparing.last, self.session.workers[COMPARE])
         page.part(self._result, COMPARE)
         ui.label("Drift: what changed between fits of one robot").classes("title").props("role=heading aria-level=2")
         page.part(self._fits, ROBOT)
         page.part(self._start_drift, DRIFT, COMPARE_START, ROBOT)
-        page.part(lambda: self._progress(DRIFT), DRIFT, progress_of(DRIFT))
+        page.progress(DRIFT, lambda: self.comparing.last_drift, self.session.workers[COMPARE])
         page.part(self._drift, DRIFT)
 
     def _choice(self) -> None:
@@ -70,10 +69,6 @@ class CompareTab:
             button.props("outline no-caps id=compare").set_enabled(not code and not comparing.last.running)
             if code:
                 ui.label(WHY[code]).classes("text quiet").props("id=why-compare")
-
-    def _progress(self, part: str) -> None:
-        task = self.comparing.last if part == COMPARE else self.comparing.last_drift
-        progress(task, lambda: self.session.start(self.session.workers[COMPARE].cancel()), part)
 
     def _result(self) -> None:
         task = self.comparing.last

@@ -7,12 +7,11 @@ from collections.abc import Callable
 from nicegui import ui
 
 from omnidyn.model.wheels import ROBOT_RADII, WHEEL_RADII
-from omnidyn.studio.elements import plot, progress, table, verdict
+from omnidyn.studio.elements import plot, table, verdict
 from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import FIT, FREE, LOGS, ROBOT
 from omnidyn.studio.series import SERIES
-from omnidyn.studio.task import progress_of
 
 WHY = {
     "no_log": "Add a log first: tab Log.",
@@ -41,7 +40,7 @@ class FitTab:
             self._robot_form()
         self.page.part(self._choices, FREE, LOGS, ROBOT)
         self.page.part(self._start, FIT, LOGS)
-        self.page.part(self._progress, FIT, progress_of(FIT))
+        self.page.progress(FIT, lambda: self.fitting.last, self.session.workers["fit"])
         self.page.part(self._result, FIT)
 
     def _robot_form(self) -> None:
@@ -123,9 +122,6 @@ class FitTab:
                 label="Free: what is fitted",
                 on_change=lambda e: self.fitting.set_free(e.value),
             ).classes("wide free").props("use-chips")
-
-    def _progress(self) -> None:
-        progress(self.fitting.last, lambda: self.session.start(self.session.workers["fit"].cancel()), "fit")
 
     def _result(self) -> None:
         fit = self.fitting.last

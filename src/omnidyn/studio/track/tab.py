@@ -9,11 +9,10 @@ from typing import Any
 from nicegui import ui
 
 from omnidyn.control.paths.path import OPTIONS
-from omnidyn.studio.elements import document, plot, progress, verdict
+from omnidyn.studio.elements import document, plot, verdict
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import PATH, ROBOT, TRACK, TRACK_START
 from omnidyn.studio.series import SERIES
-from omnidyn.studio.task import progress_of
 from omnidyn.studio.track.job import DRAWN
 from omnidyn.studio.track.state import Tracks
 
@@ -36,7 +35,7 @@ class TrackTab:
         self.page.part(self._path, PATH)
         self.page.part(self._loop, PATH, ROBOT)
         self.page.part(self._start, TRACK, TRACK_START, PATH, ROBOT)
-        self.page.part(self._progress, TRACK, progress_of(TRACK))
+        self.page.progress(TRACK, lambda: self.tracks.last, self.session.workers[TRACK])
         self.page.part(self._result, TRACK)
 
     def _path(self) -> None:
@@ -107,10 +106,6 @@ class TrackTab:
             button.props("outline no-caps id=track").set_enabled(not code and not self.tracks.last.running)
             if code:
                 ui.label(WHY[code]).classes("text quiet").props("id=why-track")
-
-    def _progress(self) -> None:
-        worker = self.session.workers[TRACK]
-        progress(self.tracks.last, lambda: self.session.start(worker.cancel()), "track")
 
     def _result(self) -> None:
         task = self.tracks.last
