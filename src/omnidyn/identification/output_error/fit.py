@@ -34,11 +34,11 @@ from omnidyn.identification.output_error.problem.friction_laws import band_note,
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated
 from omnidyn.identification.output_error.problem.problem import Problem
-from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
+from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point, point_of
 from omnidyn.identification.output_error.solve.loop import FINE_TOLERANCE as LOOP_FINE
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Best, FitProgress
-from omnidyn.identification.output_error.solve.solver import KINK_PRECISION, Normal, Solution, Solver
+from omnidyn.identification.output_error.solve.solver import NEAR_PRECISION, Normal, Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_levels, find_breakaway
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import beside, differences, refuse_bootstrap, resampled
@@ -53,7 +53,7 @@ from omnidyn.statement import WARNING, Statement
 
 HALFWAY_TOLERANCE = 3e-4  # [m/s] tolerance of the implicit engine on the way there
 FIT_PRECISION = (
-    1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
+    2.5e-3  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
 )
 
 
@@ -306,7 +306,8 @@ class Fit:
         notes += tuple(Statement("harmful_nuisance", WARNING, name) for name in rejected_names if name not in early)
         if group.engine.has_loop:  # from its start on: until it is done, the fit with all of them is the best so far
             progress = progress.aside(f"once more without {', '.join(lost)}")
-        return self._chosen(replace(self._solve(group, group.problem(kept_names), progress), notes=notes), progress)
+        simpler_solution = self._solve(group, group.problem(kept_names), progress, solution)
+        return self._chosen(replace(simpler_solution, notes=notes), progress)
 
     @property
     def _chooses(self) -> bool:
@@ -355,15 +356,16 @@ class Fit:
         if not lost or len(self.groups) != 1 or self.question.nuisances is not None:
             return None
         group = self.groups[0]
-        simpler_solution = self._solve(group, group.problem([name for name in names if name not in lost]), progress)
+        simpler_problem = group.problem([name for name in names if name not in lost])
+        simpler_solution = self._solve(group, simpler_problem, progress, solution)
         note = Statement("unsettled_nuisances", WARNING, numbers={"nuisances": tuple(lost)})
         return replace(simpler_solution, notes=(*solution.notes, note))
 
     def _solve(
         self, group: Group, problem: Problem, progress: FitProgress, base_solution: Solution | None = None
     ) -> Solution:
-        """The best point of one group alone. base_solution: a fit of it with other nuisances, near which an engine that
-        marches by steps begins."""
+        """The best point of one group alone. base_solution: a fit of it with other nuisances, at whose end an engine
+        that marches by steps begins."""
         if group.engine.has_loop:
             return solve_loop(problem, self.nu, progress)
         engine = group.engine.of(problem, FINE_TOLERANCE)
@@ -371,17 +373,20 @@ class Fit:
             progress.enter("looking for a start")
             solver = Solver(problem, engine, self.nu)
             return solver.minimise(first_point(solver, group.records), progress=progress)
-        coarse_state = coarse_point(problem, self.nu, progress, base_solution)
-        coarse_solver = Solver(problem, group.engine.of(problem, HALFWAY_TOLERANCE), self.nu, KINK_PRECISION)
-        scales = (
-            coarse_state.variance if self.nu else None
-        )  # counts find theirs anew: a step a row is too coarse for them
-        nearer_solution = coarse_solver.minimise(coarse_state.point, progress=progress, scales=scales)
-        return Solver(problem, engine, self.nu, FIT_PRECISION).minimise(
+        solver = Solver(problem, engine, self.nu, FIT_PRECISION)
+        if base_solution is not None:
+            scales = base_solution.state.variance if self.nu else None
+            return solver.minimise(point_of(base_solution, problem), progress=progress, scales=scales)
+        coarse_state = coarse_point(problem, self.nu, progress)
+        halfway_engine = group.engine.of(problem, HALFWAY_TOLERANCE)
+        nearer_solution = Solver(problem, halfway_engine, self.nu, NEAR_PRECISION, counts_ticks=False).minimise(
+            coarse_state.point, progress=progress, scales=coarse_state.variance if self.nu else None
+        )
+        return solver.minimise(
             nearer_solution.state.point,
             progress=progress,
             blocked_parameters=nearer_solution.blocked_parameters,
-            scales=nearer_solution.state.variance,
+            scales=nearer_solution.state.variance if self.nu else None,
         )
 
     def _settled_alone(self, progress: FitProgress) -> tuple[str, ...] | None:

@@ -19,6 +19,7 @@ from omnidyn.compiled.parallel import side_by_side
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX, Engine, driver_of, late_by
 from omnidyn.identification.output_error.engines.exact import HEADING, POSITION, PUSH, TILT
+from omnidyn.identification.output_error.engines.valley import bent
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
 from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
@@ -102,6 +103,10 @@ class ImplicitEngine(Engine[Problem]):
         engine = copy.copy(self)
         engine.problem, engine.last = problem, LastPoints()
         return engine
+
+    def bent(self, inner: FloatArray, step: FloatArray) -> FloatArray:
+        """The step of a fit along the valley in which motors and viscous friction go together, see `valley.py`."""
+        return bent(self.problem, inner, step)
 
     def residuals(self, point: Point) -> list[Parts]:
         """(residuals, slopes, at) of every piece, see `_piece`; those of `last` are not simulated again."""

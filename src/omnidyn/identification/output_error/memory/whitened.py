@@ -43,6 +43,10 @@ class WhitenedEngine(Engine[Problem]):
         """The engine that simulates, whose rows are as they are."""
         return self.engine
 
+    def bent(self, inner: FloatArray, step: FloatArray) -> FloatArray:
+        """A step of a fit as the engine that simulates bends it."""
+        return self.engine.bent(inner, step)
+
     def on(self, problem: Problem) -> WhitenedEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
         return WhitenedEngine(self.engine.on(problem), self.models)
@@ -109,6 +113,10 @@ class NearEngine(Engine[Problem]):
         self.problem, self._cheap = exact_engine.problem, fast_engine
         pairs = zip(exact_engine.residuals(point), fast_engine.residuals(point), strict=True)
         self._off = [(np.nan_to_num(a[0] - b[0]), np.nan_to_num(a[1] - b[1])) for a, b in pairs]
+
+    def bent(self, inner: FloatArray, step: FloatArray) -> FloatArray:
+        """A step of a fit as the engine that simulates bends it."""
+        return self._cheap.bent(inner, step)
 
     def residuals(self, point: Point) -> list[Parts]:
         """Residuals and slopes of every piece, see engines/engine.py."""

@@ -24,6 +24,8 @@ from omnidyn.statement import Statement
 MAX_ITERATIONS = 60
 END_PRECISION = 1e-5  # squared distance to the best point, in standard errors, at which it ends
 KINK_PRECISION = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
+NEAR_PRECISION = 1.0  # the same from where a descent goes on by another likelihood, or by shorter steps
+SCATTER = 5e-3  # of F by an engine that marches by steps: a difference below it says nothing, but a gradient does
 CREEP, STEPS = 3.0, 2  # times `close`, that so many steps in a row each lower F by less than: they creep along a kink
 BEND_DISTANCE = (
     100.0  # squared distance to the best point, in standard errors, beyond which a bend is not that of the end
@@ -88,9 +90,9 @@ class Solver(Generic[P]):
         counts_ticks: bool = True,
     ):
         self.problem, self.engine, self.nu, self.close, self.counted = problem, engine, nu, precision, counts_ticks
-        self.creep = (
-            CREEP * precision if precision > END_PRECISION else 0.0
-        )  # a speed loop may creep for long, and yet find its way
+        is_exact = precision <= END_PRECISION  # or a speed loop, which may creep for long, and yet find its way
+        self.creep, self._scatter = (0.0, 0.0) if is_exact else (CREEP * precision, SCATTER)
+        self._kink = max(KINK_PRECISION, precision, 2.0 * self._scatter)  # F would change by less than it scatters
         self.tick = problem.tick if counts_ticks else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
         self._edges, self.order = Edges(problem), Order(problem)
@@ -139,9 +141,9 @@ class Solver(Generic[P]):
             return self._descend(
                 self._rescaled(self.state(self._inside(start), scales))[0], limit, progress, blocked_parameters
             )
-        plain_solution = Solver(self.problem, self.engine, precision=self.close, counts_ticks=False).minimise(
-            start, limit
-        )
+        precision = max(self.close, NEAR_PRECISION) if self._scatter else self.close
+        plain_solver = Solver(self.problem, self.engine, precision=precision, counts_ticks=False)
+        plain_solution = plain_solver.minimise(start, limit, blocked_parameters=blocked_parameters)
         start_state = self.state(
             plain_solution.state.point, np.maximum(plain_solution.state.variance - self.tick**2 / 12.0, self.floor)
         )
@@ -160,11 +162,13 @@ class Solver(Generic[P]):
         for iteration in range(limit):
             normal, objective_before = Normal(self, state), state.objective
             held_parameters, is_better = normal.held, False
-            if not self.scaled.any():  # a scale that is held meanwhile would be taken for a bend
+            if not self.scaled.any() and not self._scatter:  # a scale that is held meanwhile, or scatter, is no bend
                 bend.learn(normal.inner, normal.gradient, normal.information)
             still_parameters, shift = held_parameters | blocked_parameters, np.zeros(len(held_parameters))
+            if self._scatter and damping < FIRM_DAMPING and normal.distance_without(still_parameters) < BEND_DISTANCE:
+                damping = LEAST_DAMPING  # what numbers go together by is known by priors alone: more would hold it
             while not is_better and (distance := normal.distance_without(still_parameters)) / (1.0 + damping) > (
-                self.close if damping < FIRM_DAMPING else max(KINK_PRECISION, self.close)
+                self.close if damping < FIRM_DAMPING else self._kink
             ):
                 if distance > BEND_DISTANCE:
                     bend.forget()
@@ -172,7 +176,9 @@ class Solver(Generic[P]):
                     damping, still_parameters, bend.beside(normal.information, still_parameters), shift
                 )
                 trial = self.state(moved_point, state.variance if self.scaled.any() else None)
-                is_better = trial.objective < state.objective
+                if self._scatter and trial.objective >= state.objective and distance <= BEND_DISTANCE:
+                    trial = self._returned(trial, state, still_parameters)
+                is_better = trial.objective < state.objective or self._is_nearer(trial, state, distance, still_parameters)
                 edge = None if is_better else self._edges.not_yet(still_parameters)
                 if edge is not None:  # once more, and from here on, without what may stand at a jump or a kink
                     shift = self._edges.onto(normal.inner, self.inner(moved_point.values), still_parameters | ~edge)
@@ -201,6 +207,28 @@ class Solver(Generic[P]):
             elif not is_better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
                 return Solution(state, held_parameters, iteration + 1, True, self, blocked_parameters)
         return Solution(state, held_parameters, limit, False, self, blocked_parameters)
+
+    def _returned(self, trial: State, state: State, still_parameters: BoolArray) -> State:
+        """The trial, or one step on from it where that promises to end below `state`.
+
+        A valley is curved where numbers go together and only priors tell them apart: a step along it ends above it, and
+        one from there comes down into it.
+        """
+        normal = Normal(self, trial)
+        if trial.objective - 0.5 * normal.distance_without(still_parameters) >= state.objective:
+            return trial
+        still, count = np.zeros_like(still_parameters, float), len(still_parameters)
+        point = normal.moved(DAMPING, still_parameters, np.zeros((count, count)), still)
+        return self.state(point, state.variance if self.scaled.any() else None)
+
+    def _is_nearer(self, trial: State, state: State, distance: float, still_parameters: BoolArray) -> bool:
+        """Whether a trial is nearer to the best point by its gradient, where F changes by less than it scatters.
+
+        distance: that of `state`, squared, in standard errors.
+        """
+        if not max(0.5 * distance, trial.objective - state.objective) < self._scatter:
+            return False
+        return Normal(self, trial).distance_without(still_parameters) < 0.25 * distance
 
     def _rescaled(self, state: State) -> tuple[State, float]:
         """The same point at better scales of Student's t and counts, and the largest relative change.
@@ -333,7 +361,7 @@ class Normal:
         gradient, information = fold.T @ gradient, fold.T @ (information + bend) @ fold
         step = np.where(still_parameters, onto, 0.0)
         step[free] = _solve(information[np.ix_(free, free)], (gradient - information @ step)[free])
-        inner_values = self.solver.clipped(self.inner + fold @ step)
+        inner_values = self.solver.clipped(self.inner + self.solver.engine.bent(self.inner, fold @ step))
         step = inner_values - self.inner
         k, states = self._count, []
         for (grad, info), old in zip(self.pieces, self.state.point.states, strict=True):
