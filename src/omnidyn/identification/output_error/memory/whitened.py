@@ -37,6 +37,7 @@ class WhitenedEngine(Engine[Problem]):
         moves: Sequence[BoolArray] | None = None,
     ):
         self.engine, self.models, self.problem, self._moves = engine, dict(models), engine.problem, moves
+        self.tol = engine.tol
 
     @property
     def unfiltered(self) -> Engine[Problem]:

@@ -27,7 +27,7 @@ MANY_ROWS = 100_000  # rows to which a long log is first fitted
 FEW_ROWS = 1500  # the same for the implicit engine
 LATENCIES = 500  # steps for their median
 FRICTION_SHARES = (0.3, 0.1, 0.03)  # shares of its friction with which a robot may move as the log does
-BIAS = 1e-4  # squared distance to the best point, in standard errors, that is near, per row: what a step a row is off by does not shrink with the rows
+BIAS = 1e-2  # of that squared distance, per row: what a step a row is off by does not shrink with the rows
 
 
 def first_point(solver: Solver, records: Sequence[Record]) -> State:
@@ -89,8 +89,7 @@ def point_of(base_solution: Solution, problem: Problem) -> Point:
 def coarse_point(problem: Problem, nu: float, progress: FitProgress) -> State:
     """A state near the best point, by a step a row; a long log is first fitted in part."""
     progress.enter("looking for a start")
-    rows = sum(piece.last - piece.first for piece in problem.pieces)
-    solver = _by_row(problem, nu, max(NEAR_PRECISION, BIAS * rows))
+    solver = _by_row(problem, nu)
     short, start_point = problem.shortened(FEW_ROWS), moving_start(problem, nu, progress)
     if short is problem:
         return solver.minimise(start_point, progress=progress).state
@@ -103,24 +102,24 @@ def coarse_point(problem: Problem, nu: float, progress: FitProgress) -> State:
     return solver.minimise(min(states, key=lambda state: state.objective).point, progress=progress).state
 
 
-def _by_row(problem: Problem, nu: float, precision: float = NEAR_PRECISION) -> Solver[Problem]:
+def _by_row(problem: Problem, nu: float) -> Solver[Problem]:
     """The solver by a step a row: too coarse for counts, which are taken like any other output."""
-    return Solver(problem, ImplicitEngine.of(problem), nu, precision, counts_ticks=False)
+    return Solver(problem, ImplicitEngine.of(problem), nu, _precision(problem), counts_ticks=False)
 
 
-def _timed(problem: Problem, point: Point, nu: float, progress: FitProgress) -> Point:
-    """The point with the latencies that go with motors near their own.
+def _precision(problem: Problem) -> float:
+    """Squared distance to the best point of a step a row, in standard errors, that is near the best point of all."""
+    return max(NEAR_PRECISION, BIAS * sum(piece.last - piece.first for piece in problem.pieces))
+
+
+def _motors_first(problem: Problem, point: Point, nu: float, progress: FitProgress) -> State:
+    """The state near the best point with every latency at its start.
 
     The latency of a current meets a jump at every row: a motor that is a wrong guess brings it to the wrong side of it,
     and no descent brings it back. Of a path, half the force a tenth of a second earlier looks like the whole one: a
-    valley that ends in another minimum. So motors come first, with every latency at its start.
+    valley that ends in another minimum. So motors come first.
     """
-    parts = {p.part for p in problem.parameters}
-    if LATENCY not in parts or (MOTOR not in parts and problem.where(CURRENTS) < 0):
-        return point
-    held_problem = _on_time(problem)
-    first = _by_row(held_problem, nu).minimise(point, progress=progress.aside("motors first"))
-    return _with_latencies(_by_row(problem, nu), first.state).point
+    return _by_row(_on_time(problem), nu).minimise(point, progress=progress.aside("motors first")).state
 
 
 def _on_time(problem: Problem) -> Problem:
@@ -164,7 +163,7 @@ def _by_rates(problem: Problem, point: Point, nu: float, progress: FitProgress) 
     than their path, so that the better one of both is taken.
     """
     held_problem = _on_time(problem)
-    solver = Solver(held_problem, RateEngine(held_problem), nu, NEAR_PRECISION, counts_ticks=False)
+    solver = Solver(held_problem, RateEngine(held_problem), nu, _precision(problem), counts_ticks=False)
     rate_point = solver.minimise(point, progress=progress.aside("rates before paths")).state.point
     return Point(rate_point.values, point.states)
 
@@ -203,12 +202,12 @@ def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
         ),
     ]
     costs = side_by_side(lambda point: solver.state(point).objective, points)
-    best = points[int(np.argmin(costs))]
-    best = _levels_first(short, best, nu, progress)
-    start_states = [best]
+    best = _levels_first(short, points[int(np.argmin(costs))], nu, progress)
+    start_points = [best]
     if any(name in TRAVELS for name, _ in short.columns):
-        start_states.append(_by_rates(short, best, nu, progress))
-    return min(
-        (_timed(short, start_state, nu, progress) for start_state in start_states),
-        key=lambda point: solver.state(point).objective,
-    )
+        start_points.append(_by_rates(short, best, nu, progress))
+    parts = {p.part for p in problem.parameters}
+    if LATENCY in parts and (MOTOR in parts or problem.where(CURRENTS) >= 0):
+        states = [_motors_first(short, start, nu, progress) for start in start_points]
+        return _with_latencies(solver, min(states, key=lambda state: state.objective)).point
+    return min(start_points, key=lambda start: solver.state(start).objective) if len(start_points) > 1 else best

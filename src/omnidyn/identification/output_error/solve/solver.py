@@ -25,7 +25,8 @@ MAX_ITERATIONS = 60
 END_PRECISION = 1e-5  # squared distance to the best point, in standard errors, at which it ends
 KINK_PRECISION = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
 NEAR_PRECISION = 1.0  # the same from where a descent goes on by another likelihood, or by shorter steps
-SCATTER = 5e-3  # of F by an engine that marches by steps: a difference below it says nothing, but a gradient does
+LEAST_STEP = 0.3  # share of a step that is too long: what is less long goes another way
+SCATTER = 1e-2  # of F by an engine that marches by steps: a difference below it says nothing, but a gradient does
 CREEP, STEPS = 3.0, 2  # times `close`, that so many steps in a row each lower F by less than: they creep along a kink
 BEND_DISTANCE = (
     100.0  # squared distance to the best point, in standard errors, beyond which a bend is not that of the end
@@ -158,32 +159,34 @@ class Solver(Generic[P]):
             held_parameters if blocked_parameters is None else blocked_parameters,
             Bend(len(held_parameters)),
         )
-        is_released, slow_steps = False, 0
+        is_released, slow_steps, share = False, 0, 1.0
         for iteration in range(limit):
             normal, objective_before = Normal(self, state), state.objective
-            held_parameters, is_better = normal.held, False
+            held_parameters, is_better, is_halved = normal.held, False, False
             if not self.scaled.any() and not self._scatter:  # a scale that is held meanwhile, or scatter, is no bend
                 bend.learn(normal.inner, normal.gradient, normal.information)
             still_parameters, shift = held_parameters | blocked_parameters, np.zeros(len(held_parameters))
-            if self._scatter and damping < FIRM_DAMPING and normal.distance_without(still_parameters) < BEND_DISTANCE:
-                damping = LEAST_DAMPING  # what numbers go together by is known by priors alone: more would hold it
+            is_near = normal.distance_without(still_parameters) < BEND_DISTANCE
+            if self._scatter and self.engine.tol and damping < FIRM_DAMPING and is_near:
+                damping = 0.0  # what numbers go together by is known by priors alone: any would hold it
             while not is_better and (distance := normal.distance_without(still_parameters)) / (1.0 + damping) > (
                 self.close if damping < FIRM_DAMPING else self._kink
             ):
                 if distance > BEND_DISTANCE:
                     bend.forget()
                 moved_point = normal.moved(
-                    damping, still_parameters, bend.beside(normal.information, still_parameters), shift
+                    damping, still_parameters, bend.beside(normal.information, still_parameters), shift, share
                 )
                 trial = self.state(moved_point, state.variance if self.scaled.any() else None)
-                if self._scatter and trial.objective >= state.objective and distance <= BEND_DISTANCE:
-                    trial = self._returned(trial, state, still_parameters)
                 is_better = trial.objective < state.objective or self._is_nearer(trial, state, distance, still_parameters)
+                if not is_better and damping == 0.0 and share > LEAST_STEP and share * distance > self._kink:
+                    share, is_halved = 0.5 * share, True  # a valley: shorter, but the same way
+                    continue
                 edge = None if is_better else self._edges.not_yet(still_parameters)
                 if edge is not None:  # once more, and from here on, without what may stand at a jump or a kink
                     shift = self._edges.onto(normal.inner, self.inner(moved_point.values), still_parameters | ~edge)
                     blocked_parameters = blocked_parameters | edge
-                    still_parameters = still_parameters | blocked_parameters
+                    still_parameters, share = still_parameters | blocked_parameters, 1.0
                     continue
                 if not is_better and shift.any():  # what was a guess is dropped before steps get shorter
                     shift = np.zeros(len(held_parameters))
@@ -191,7 +194,13 @@ class Solver(Generic[P]):
                 if not is_better and bend.known:
                     bend.forget()
                     continue
-                damping = max(damping / 10.0, LEAST_DAMPING) if is_better else max(damping * 10.0, FIRM_DAMPING)
+                share = 1.0 if not is_better else share if is_halved else min(2.0 * share, 1.0)
+                change_of_damping = 100.0 if self._scatter and (damping >= FIRM_DAMPING or not is_better) else 10.0
+                damping = (
+                    max(damping / change_of_damping, LEAST_DAMPING)
+                    if is_better
+                    else max(damping * change_of_damping, FIRM_DAMPING)
+                )
                 state = trial if is_better else state
             slow_steps = slow_steps + 1 if is_better and objective_before - state.objective < self.creep else 0
             if self.scaled.any():
@@ -207,19 +216,6 @@ class Solver(Generic[P]):
             elif not is_better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
                 return Solution(state, held_parameters, iteration + 1, True, self, blocked_parameters)
         return Solution(state, held_parameters, limit, False, self, blocked_parameters)
-
-    def _returned(self, trial: State, state: State, still_parameters: BoolArray) -> State:
-        """The trial, or one step on from it where that promises to end below `state`.
-
-        A valley is curved where numbers go together and only priors tell them apart: a step along it ends above it, and
-        one from there comes down into it.
-        """
-        normal = Normal(self, trial)
-        if trial.objective - 0.5 * normal.distance_without(still_parameters) >= state.objective:
-            return trial
-        still, count = np.zeros_like(still_parameters, float), len(still_parameters)
-        point = normal.moved(DAMPING, still_parameters, np.zeros((count, count)), still)
-        return self.state(point, state.variance if self.scaled.any() else None)
 
     def _is_nearer(self, trial: State, state: State, distance: float, still_parameters: BoolArray) -> bool:
         """Whether a trial is nearer to the best point by its gradient, where F changes by less than it scatters.
@@ -351,24 +347,27 @@ class Normal:
             block_scores.append(block_score)
         return np.concatenate(block_scores)
 
-    def moved(self, damping: float, still_parameters: BoolArray, bend: FloatArray, onto: FloatArray) -> Point:
+    def moved(
+        self, damping: float, still_parameters: BoolArray, bend: FloatArray, onto: FloatArray, share: float = 1.0
+    ) -> Point:
         """The point of the damped step, within the bounds, without the parameters that are `still_parameters`.
 
-        bend (P, P): what the information lacks, see `Bend`. onto (P,): the step of these, see `Edges`.
+        bend (P, P): what the information lacks, see `Bend`. onto (P,): the step of these, see `Edges`. share: of the
+        whole step that is taken.
         """
         gradient, information = self._reduced(damping)
         free, fold = ~still_parameters, self.solver.order.together(self.inner, still_parameters)
         gradient, information = fold.T @ gradient, fold.T @ (information + bend) @ fold
         step = np.where(still_parameters, onto, 0.0)
         step[free] = _solve(information[np.ix_(free, free)], (gradient - information @ step)[free])
-        inner_values = self.solver.clipped(self.inner + self.solver.engine.bent(self.inner, fold @ step))
+        inner_values = self.solver.clipped(self.inner + self.solver.engine.bent(self.inner, share * (fold @ step)))
         step = inner_values - self.inner
         k, states = self._count, []
         for (grad, info), old in zip(self.pieces, self.state.point.states, strict=True):
             new = old.copy()
             if grad.shape[0] > k:
                 damped_information = _damped(info, damping)
-                new += of_states(damped_information[k:, k:], grad[k:] - damped_information[k:, :k] @ step)
+                new += of_states(damped_information[k:, k:], share * grad[k:] - damped_information[k:, :k] @ step)
                 new[: len(SPEED_LIMITS)] = np.clip(new[: len(SPEED_LIMITS)], -SPEED_LIMITS, SPEED_LIMITS)
             states.append(new)
         return Point(self.solver.outer(inner_values), tuple(states))
