@@ -27,6 +27,8 @@ from omnidyn.model.stick_slip.step_bound import MONOTONE
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, commands, current_bounds
+from omnidyn.simulation.coulomb.door import knows as is_coulomb_run
+from omnidyn.simulation.coulomb.door import run as run_coulomb
 from omnidyn.simulation.engine import (
     TOLERANCE,
     Implicit,
@@ -173,6 +175,8 @@ def late_samples(
     friction solver hit its cap. Raises InputError for a direction that changes friction or a gear loss which is off.
     """
     (numbers, plants), (t, voltage, start, _) = _plants(robot, directions), program
+    if is_coulomb_run(numbers, plants):
+        return _coulomb_samples(robot, program, directions, late, tol, travel, (numbers, plants)), 0
     rates = np.zeros((len(directions), *voltage.shape))
     first, length = np.zeros((len(directions), width(numbers))), numbers.body.length
     stretch = _stretch(plants)
@@ -193,6 +197,64 @@ def late_samples(
         samples,
     )
     return _looks(robot, directions, samples, (length, stretch), (samples.t, voltage, rates)), capped(outcome)
+
+
+def _coulomb_samples(
+    robot: Robot,
+    program: VoltageProgram,
+    directions: Sequence[Direction],
+    late: Sequence[float],
+    tol: float | None,
+    travel: int,
+    moved: tuple[Plant, list[Plant]],
+) -> list[LateSample]:
+    """`late_samples` of a robot under Coulomb friction; moved: its plant, and those up and down each direction."""
+    (numbers, plants), (t, voltage, start, push), count = moved, program, len(directions)
+    order = sorted(range(count), key=lambda k: directions[k].up is None)  # those that change the robot come first
+    changed = [plants[2 * k + side] for k in order if directions[k].up is not None for side in range(2)]
+    rates = [{"voltage": d.voltage, "push": d.push, "twist": d.start} for d in (directions[k] for k in order)]
+    dt = held(t, len(voltage), late)
+    seen = run_coulomb(
+        numbers,
+        t,
+        dt,
+        np.ascontiguousarray(voltage),
+        np.asarray(start, dtype=float),
+        ROUGH_TOLERANCE if tol is None else as_tolerance(tol),
+        np.asarray(late, dtype=float),
+        travel,
+        push,
+        changed,
+        EPS,
+        rates,
+    )
+    place = np.argsort(order)
+    at_rows = np.clip(np.searchsorted(seen.t, seen.t[None] - seen.late[:, None] + SAME_TIME, side="right") - 1, 0, None)
+    looks = []
+    for c, delay in enumerate(seen.late):
+        at = np.minimum(at_rows[c], len(voltage) - 1)
+        dvoltage = np.zeros((len(t), count, voltage.shape[1]))
+        for k, direction in enumerate(directions):
+            if direction.voltage is not None:
+                dvoltage[:, k] = direction.voltage[at]
+        looks.append(
+            LateSample(
+                robot,
+                tuple(directions),
+                float(delay),
+                seen.twist[c],
+                seen.pace[c],
+                seen.way[c],
+                voltage[at],
+                np.moveaxis(seen.dtwist[c], 1, 2)[:, place],
+                np.moveaxis(seen.dway[c], 1, 2)[:, place],
+                dvoltage,
+                None,
+                None,
+                None,
+            )
+        )
+    return looks
 
 
 def _within(tol: float | None, numbers: Plant, dt: FloatArray) -> float:
