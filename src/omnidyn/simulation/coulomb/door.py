@@ -2,81 +2,100 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
-from omnidyn.model.layout import N_AXES, Plant
-from omnidyn.simulation.coulomb.law import changes, drive_of, is_coulomb, kind_of, law_of
+from omnidyn.model.layout import N_AXES, Plant, many
+from omnidyn.simulation.coulomb.law import couples, drives_of, is_coulomb, kind_of, laws_of
 from omnidyn.simulation.coulomb.run import Law, Rows, Seen, empty_seen, run_rows
+from omnidyn.simulation.way import SAME_TIME
 
 MEMORY_BOUNDS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its memory, within these bounds
+SAME_SHARE = 1e-3  # of the shortest row: times nearer than this are one, or than SAME_TIME
 MOST_STEPS = (1e6, 7e6)  # steps solved at tol 1e-6, and so many more per second simulated; then a run is given up
 
 
-def knows(numbers: Plant, plants: Sequence[Plant]) -> bool:
-    """Whether a robot, and all that a derivative compares it with, moves by the law of this room."""
-    others = {id(plant): plant for plant in plants if plant is not numbers}.values()
-    kind = kind_of(numbers)
-    return is_coulomb(numbers) and all(is_coulomb(plant, couples=True) and kind_of(plant) == kind for plant in others)
+class Moved(NamedTuple):
+    """A robot of this room, and how it changes along directions: see law.py."""
+
+    law: Law
+    drive: FloatArray  # (3, n)
+    drive_change: FloatArray  # (R, 3, n)
+
+
+def moved(numbers: Plant, plants: Sequence[Plant], step: float) -> Moved | None:
+    """The robot, and its derivatives from plants up (2k) and down (2k + 1) each of R directions, by `step`; None where
+    this room does not know one of them."""
+    everyone = many([numbers, *plants])
+    kinds = kind_of(everyone)
+    if couples(numbers) or not is_coulomb(everyone).all() or (kinds != kinds[0]).any():
+        return None
+    laws, drives = laws_of(everyone), drives_of(everyone)
+    change = (laws[1::2] - laws[2::2]).T / (2.0 * step)
+    memory = min(max(float(numbers.body.memory[0]), MEMORY_BOUNDS[0]), MEMORY_BOUNDS[1])
+    law = Law(laws[0].copy(), np.ascontiguousarray(change), int(kinds[0]), memory)
+    return Moved(law, drives[0], (drives[1::2] - drives[2::2]) / (2.0 * step))
 
 
 def run(
-    numbers: Plant,
+    robot: Moved,
     t: FloatArray,
     dt: FloatArray,
     voltage: FloatArray,
     twist: FloatArray,
+    step: FloatArray,
     tol: float,
     late: FloatArray,
-    travel: int,
+    way: FloatArray,
     push: FloatArray | None = None,
-    changed: Sequence[Plant] = (),
-    step: float = 1.0,
-    rates: Sequence[dict[str, Any]] = (),
+    rates: Sequence[Mapping[str, FloatArray | None]] = (),
+    order: Sequence[int] = (),
 ) -> Seen:
     """A run from a twist under held voltages, seen at t - late, with its derivatives.
 
     Args:
-        numbers: of the robot.
+        robot: with its derivatives by the first R of K directions.
         t: of the samples [s], shape (samples,).
         dt: for how long each voltage holds [s], shape (rows,).
         voltage: at the motors [V], shape (rows, n).
         twist: at the start, shape (3,).
+        step: to begin with [s], shape (1,); becomes the one to go on with.
         tol: of the twist [m/s].
         late: latencies [s], shape (L,).
-        travel: how many numbers of the way, see sensitivity/sample.py.
+        way: at the start, shape (W,), of as many numbers as are wanted: see ../way.py.
         push: wrench from outside over each row [N, N, N m], shape (rows, 3).
-        changed, step: plants up (2k) and down (2k + 1) each of the first R of K directions, by this step.
         rates: of each of the K directions the derivatives of voltage, push and twist, where there are any.
+        order: the place of each of them in what is seen.
 
     Raises InputError where motion is so fast beside its duration that no patience would do.
     """
-    drive, keys = drive_of(numbers), len(rates)
-    law_changes, drive_changes = changes(changed, step)
+    drive, keys = robot.drive, len(rates)
     force, dforce = voltage @ drive.T, np.zeros((len(dt), N_AXES, keys))
+    changes = robot.drive_change
+    if len(changes):
+        dforce[:, :, : len(changes)] = (
+            (voltage @ changes.reshape(-1, drive.shape[1]).T).reshape(len(dt), len(changes), N_AXES).swapaxes(1, 2)
+        )
     if push is not None:
         force = force + push[: len(dt)]
     dtwist = np.zeros((N_AXES, keys))
     for k, rate in enumerate(rates):
-        if k < len(drive_changes) and drive_changes[k].any():
-            dforce[:, :, k] = voltage @ drive_changes[k].T
-        if rate.get("voltage") is not None:
-            dforce[:, :, k] += rate["voltage"] @ drive.T
-        if rate.get("push") is not None:
-            dforce[:, :, k] += rate["push"][: len(dt)]
-        if rate.get("twist") is not None:
-            dtwist[:, k] = rate["twist"]
-    memory = min(max(float(numbers.body.memory[0]), MEMORY_BOUNDS[0]), MEMORY_BOUNDS[1])
-    law = Law(law_of(numbers), law_changes, kind_of(numbers), memory)
-    seen = empty_seen(t, late, keys, travel)
+        dvoltage, dpush, start = rate.get("voltage"), rate.get("push"), rate.get("twist")
+        if dvoltage is not None:
+            dforce[:, :, k] += dvoltage @ drive.T
+        if dpush is not None:
+            dforce[:, :, k] += dpush[: len(dt)]
+        if start is not None:
+            dtwist[:, k] = start
+    same = min(SAME_TIME, SAME_SHARE * float(dt.min()))
+    seen = empty_seen(t, late, same, np.asarray(order, dtype=np.int64), len(way))
     limit = (MOST_STEPS[0] + MOST_STEPS[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** 0.25)
     rows = Rows(np.ascontiguousarray(dt), np.ascontiguousarray(force), dforce)
-    row = run_rows(law, rows, np.array(twist, dtype=float), dtwist, tol, min(limit, math.inf), seen)
+    row = run_rows(robot.law, rows, np.array(twist, dtype=float), way, dtwist, step, tol, limit, seen)
     if row < len(dt):
         raise InputError(
             "this robot moves too fast to be followed",

@@ -2,17 +2,15 @@
 
     M v' = P u + push - D v + m omega (v_y, -v_x, 0) - f(v)
 
-v = (v_x, v_y, omega); M diagonal; D: viscous friction and back-EMF; P: force per volt at rest; m: the mass where the body
-frame turns. f: C sgn(v) per axis, or along the direction of travel (model/friction/direction.py).
+v = (v_x, v_y, omega); M diagonal; D: viscous friction and back-EMF; P: force per volt at rest; m: the mass where the
+body frame turns. f: C sgn(v) per axis, or along the direction of travel (model/friction/direction.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.model.layout import N_AXES, Plant
 
 MASS, DAMPING, TURNING, FORWARD, BACKWARD, TRAVEL = 0, 9, 18, 19, 22, 25  # places in a law
@@ -20,68 +18,54 @@ SIZE = 27
 BOX, ELLIPSE, PLAIN = 0, 1, 2  # where friction acts in the plane: per axis, along the direction of travel
 
 
-def is_coulomb(plant: Plant, couples: bool = False) -> bool:
-    """Whether this room knows a robot: constant levels that hold no more than they slide with, currents that settle at
-    once and meet no limit, a mass that couples no axes. couples: it may do so, as in a derivative."""
-    body, element = plant
-    motors = element[N_AXES:]
-    off_diagonal = body.spin[~np.eye(N_AXES, dtype=bool)]
-    simple_motors = (
-        (motors["active"] == 0.0)
-        & (motors["breakaway"] == 0.0).all(axis=1)
-        & (motors["inductance"] == 0.0)
-        & (motors["drop"] == 0.0)
-        & (motors["efficiency"] == 1.0)
-        & np.isinf(motors["limit"])
-    )
-    axes_slide = bool((element["breakaway"][:2] > 0.0).any())
-    return bool(
-        not (body.laws or body.bristles or body.gathers or body.off or body.room.any())
-        and (couples or not off_diagonal.any())
-        and (element["breakaway"] == element["coulomb"]).all()
-        and (body.breakaway == body.coulomb).all()
-        and not (body.active and axes_slide)
-        and simple_motors.all()
-    )
+def is_coulomb(plants: Plant) -> BoolArray:
+    """Whether this room knows robots, apart from `couples`: constant levels that hold no more than they slide with,
+    currents that settle at once and meet no limit. Shape (*batch,), as of the plants."""
+    body, element = plants
+    motors, axes = element[..., N_AXES:], element[..., :N_AXES]
+    stays = (body["laws"] == 0.0) & (body["bristles"] == 0.0) & (body["gathers"] == 0.0) & (body["off"] == 0.0)
+    settles = (motors["inductance"] == 0.0) & (motors["drop"] == 0.0) & (motors["efficiency"] == 1.0)
+    free = (motors["active"] == 0.0) & (motors["breakaway"] == 0.0).all(axis=-1) & np.isinf(motors["limit"])
+    one_level = (axes["breakaway"] == axes["coulomb"]).all(axis=(-2, -1))
+    one_level &= (body["breakaway"] == body["coulomb"]).all(axis=-1)
+    both = (body["active"] != 0.0) & (axes["breakaway"][..., :2, :] > 0.0).any(axis=(-2, -1))
+    return stays & one_level & ~both & (settles & free).all(axis=-1) & ~body["room"].any(axis=-1)
 
 
-def kind_of(plant: Plant) -> int:
-    """BOX, ELLIPSE or PLAIN."""
-    if not plant.body.active:
-        return BOX
-    return PLAIN if plant.body.plain else ELLIPSE
+def couples(plant: Plant) -> bool:
+    """Whether the mass of a robot couples its axes: then a stop may release another axis, which nobody here sees."""
+    return bool(plant.body.spin[~np.eye(N_AXES, dtype=bool)].any())
 
 
-def law_of(plant: Plant) -> FloatArray:
-    """The numbers of a robot, M and D by rows; yaw in rad/s. Shape (SIZE,)."""
-    body, element = plant
-    units = np.array([1.0, 1.0, float(body.length)])
-    motors, g = element[N_AXES:], element["g"]
+def kind_of(plants: Plant) -> IntArray:
+    """BOX, ELLIPSE or PLAIN. Shape (*batch,)."""
+    body = plants.body
+    return np.where(body["active"] == 0.0, BOX, np.where(body["plain"] != 0.0, PLAIN, ELLIPSE))
+
+
+def laws_of(plants: Plant) -> FloatArray:
+    """The numbers of robots, M and D by rows; yaw in rad/s. Shape (*batch, SIZE)."""
+    body, element = plants
+    units = np.ones((*body.shape, N_AXES))
+    units[..., 2] = body["length"]
+    motors, g = element[..., N_AXES:], element["g"]
     damping = element["viscous"].copy()
-    damping[N_AXES:] += motors["thrust"] * motors["emf"] / motors["resistance"]
-    square = np.outer(units, units)
-    law = np.zeros(SIZE)
-    law[MASS:DAMPING] = ((body.mass * np.eye(N_AXES) + body.spin) * square).ravel()
-    law[DAMPING:TURNING] = ((g.T * damping) @ g * square).ravel()
-    law[TURNING] = body.turning * body.length
-    law[FORWARD:BACKWARD] = element["coulomb"][:N_AXES, 0] * units
-    law[BACKWARD:TRAVEL] = element["coulomb"][:N_AXES, 1] * units
-    law[TRAVEL:] = body.coulomb
+    damping[..., N_AXES:] += motors["thrust"] * motors["emf"] / motors["resistance"]
+    square = units[..., :, None] * units[..., None, :]
+    mass = body["mass"][..., None, None] * np.eye(N_AXES) + body["spin"]
+    law = np.zeros((*body.shape, SIZE))
+    law[..., MASS:DAMPING] = (mass * square).reshape(*body.shape, 9)
+    law[..., DAMPING:TURNING] = (np.einsum("...ea,...e,...eb->...ab", g, damping, g) * square).reshape(*body.shape, 9)
+    law[..., TURNING] = body["turning"] * body["length"]
+    law[..., FORWARD:BACKWARD] = element["coulomb"][..., :N_AXES, 0] * units
+    law[..., BACKWARD:TRAVEL] = element["coulomb"][..., :N_AXES, 1] * units
+    law[..., TRAVEL:] = body["coulomb"]
     return law
 
 
-def drive_of(plant: Plant) -> FloatArray:
-    """P [N/V, N/V, N m/V]. Shape (3, wheels)."""
-    motors = plant.element[N_AXES:]
-    drive = motors["g"].T * (motors["thrust"] / motors["resistance"])
-    drive[2] *= plant.body.length
+def drives_of(plants: Plant) -> FloatArray:
+    """P [N/V, N/V, N m/V]. Shape (*batch, 3, wheels)."""
+    motors = plants.element[..., N_AXES:]
+    drive = np.swapaxes(motors["g"], -1, -2) * (motors["thrust"] / motors["resistance"])[..., None, :]
+    drive[..., 2, :] *= plants.body["length"][..., None]
     return drive
-
-
-def changes(plants: Sequence[Plant], step: float) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of the laws (SIZE, K) and of the drives (K, 3, wheels), from plants up (2k) and down (2k + 1)."""
-    laws = np.array([law_of(plant) for plant in plants]).reshape(-1, 2, SIZE)
-    drives = np.array([drive_of(plant) for plant in plants])
-    drives = drives.reshape(len(laws), 2, *drives.shape[1:]) if len(laws) else np.zeros((0, 2, N_AXES, 1))
-    half = 2.0 * step
-    return np.ascontiguousarray((laws[:, 0] - laws[:, 1]).T / half), (drives[:, 0] - drives[:, 1]) / half

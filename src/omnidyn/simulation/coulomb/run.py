@@ -7,7 +7,7 @@ Steps are those of Alexander's SDIRK3, whose stages are inclusions, so that rest
 Third order, L-stable. k1 - 2 k2 + k3 estimates the error of a second order step; that of the step itself is 1.18 times
 as much and its square root in units of what changes (measured on x' = -x, for any step). A step in which something
 stops, reverses or is released is cut until it is short, and then one implicit Euler stage. Between the ends of steps
-sensors see Hermite's cubic of both ends; the way is integrated by the weights of the step, see sensitivity/sample.py.
+sensors see Hermite's cubic of both ends; the way is integrated by the weights of the step, see ../way.py.
 
 Alexander, SIAM J. Numer. Anal. 14 (1977).
 """
@@ -24,7 +24,7 @@ from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.simulation.coulomb.events import INSTANT, YAW_SHARE, astray, happens, leap
 from omnidyn.simulation.coulomb.law import BOX
 from omnidyn.simulation.coulomb.stage import RHO, SLIDES, solve_stage, speed_along, stage_derivatives
-from omnidyn.simulation.sensitivity.sample import PATH, PLACE, SAME_TIME, TURN
+from omnidyn.simulation.way import PATH, PLACE, TURN
 
 GAMMA = 0.4358665215084590  # the root of x^3 - 3 x^2 + 3/2 x - 1/6 at which SDIRK3 is L-stable
 A21, B1, B2 = (
@@ -40,19 +40,21 @@ EVENTS_MORE = 10
 
 
 class Seen(NamedTuple):
-    """What sensors show at times t - late. L latencies, K derivatives, W numbers of the way; see sensitivity/sample.py.
+    """What sensors show at times t - late. L latencies, K derivatives, W numbers of the way; see ../way.py.
 
     NaN where t - late lies outside the run.
     """
 
     t: FloatArray  # (rows,) [s], from the start of the run
     late: FloatArray  # (L,) [s]
+    same: float  # [s] times that differ by less are one
     next: IntArray  # (L,) the row whose sample is next
+    order: IntArray  # (K,) the place of each derivative
     twist: FloatArray  # (L, rows, 3)
     pace: FloatArray  # (L, rows, 3) its time derivative
     way: FloatArray  # (L, rows, W)
-    dtwist: FloatArray  # (L, rows, 3, K)
-    dway: FloatArray  # (L, rows, W, K)
+    dtwist: FloatArray  # (L, rows, K, 3)
+    dway: FloatArray  # (L, rows, K, W)
 
 
 class Law(NamedTuple):
@@ -91,18 +93,20 @@ class Work(NamedTuple):
     dspare: FloatArray  # (3, K)
 
 
-def empty_seen(t: FloatArray, late: FloatArray, keys: int, travel: int) -> Seen:
-    """Nothing has been seen yet. keys: K; travel: W."""
+def empty_seen(t: FloatArray, late: FloatArray, same: float, order: IntArray, travel: int) -> Seen:
+    """Nothing has been seen yet. travel: W."""
     shape = (len(late), len(t))
     return Seen(
         np.ascontiguousarray(t - t[0]),
         np.array(late, dtype=float),
+        same,
         np.zeros(len(late), np.int64),
+        order,
         np.full((*shape, 3), np.nan),
         np.full((*shape, 3), np.nan),
         np.full((*shape, travel), np.nan),
-        np.full((*shape, 3, keys), np.nan),
-        np.full((*shape, travel, keys), np.nan),
+        np.full((*shape, len(order), 3), np.nan),
+        np.full((*shape, len(order), travel), np.nan),
     )
 
 
@@ -308,11 +312,11 @@ def _see_end(seen, work, c, r):
     for a in range(3):
         seen.twist[c, r, a], seen.pace[c, r, a] = work.ends[2, a], work.rate[1, a]
         for k in range(work.d.shape[1]):
-            seen.dtwist[c, r, a, k] = work.dends[2, a, k]
+            seen.dtwist[c, r, seen.order[k], a] = work.dends[2, a, k]
     for a in range(seen.way.shape[2]):
         seen.way[c, r, a] = work.way[1, a]
         for k in range(work.d.shape[1]):
-            seen.dway[c, r, a, k] = work.dway[1, a, k]
+            seen.dway[c, r, seen.order[k], a] = work.dway[1, a, k]
 
 
 @part
@@ -321,11 +325,11 @@ def _see_start(seen, work, c, r):
     for a in range(3):
         seen.twist[c, r, a], seen.pace[c, r, a] = work.x[a], work.rate[0, a]
         for k in range(work.d.shape[1]):
-            seen.dtwist[c, r, a, k] = work.d[a, k]
+            seen.dtwist[c, r, seen.order[k], a] = work.d[a, k]
     for a in range(seen.way.shape[2]):
         seen.way[c, r, a] = work.way[0, a]
         for k in range(work.d.shape[1]):
-            seen.dway[c, r, a, k] = work.dway[0, a, k]
+            seen.dway[c, r, seen.order[k], a] = work.dway[0, a, k]
 
 
 @part
@@ -341,7 +345,7 @@ def _see_between(seen, work, c, r, h, share):
         seen.twist[c, r, a] = start * x0 + begin * f0 + end * x1 + last * f1
         seen.pace[c, r, a] = slope * (x1 - x0) + early * f0 + late * f1
         for k in range(work.d.shape[1]):
-            seen.dtwist[c, r, a, k] = (
+            seen.dtwist[c, r, seen.order[k], a] = (
                 start * work.d[a, k]
                 + begin * work.drate[0, a, k]
                 + end * work.dends[2, a, k]
@@ -354,7 +358,9 @@ def _see_between(seen, work, c, r, h, share):
         for k in range(work.d.shape[1]):
             g0 = _way_rate(work.way[0], work.x, work.dway[0], work.d, a, k)
             g1 = _way_rate(work.way[1], work.ends[2], work.dway[1], work.dends[2], a, k)
-            seen.dway[c, r, a, k] = start * work.dway[0, a, k] + begin * g0 + end * work.dway[1, a, k] + last * g1
+            seen.dway[c, r, seen.order[k], a] = (
+                start * work.dway[0, a, k] + begin * g0 + end * work.dway[1, a, k] + last * g1
+            )
 
 
 @part
@@ -366,12 +372,12 @@ def _look(seen, law, work, force, dforce, begin, h, share, euler, knows_rate):
         while seen.next[c] < len(seen.t):
             r = seen.next[c]
             after = seen.t[r] - seen.late[c] - begin
-            if after > h + SAME_TIME:
+            if after > h + seen.same:
                 break
             seen.next[c] += 1
-            if after < -SAME_TIME:
+            if after < -seen.same:
                 continue
-            if after > h - SAME_TIME:
+            if after > h - seen.same:
                 _see_end(seen, work, c, r)
                 continue
             if not rates:
@@ -380,7 +386,7 @@ def _look(seen, law, work, force, dforce, begin, h, share, euler, knows_rate):
             if not knows_rate:
                 knows_rate = True
                 _begin_rate(law, work, force, dforce)
-            if after < SAME_TIME:
+            if after < seen.same:
                 _see_start(seen, work, c, r)
             else:
                 _see_between(seen, work, c, r, h, after / h)
@@ -411,9 +417,12 @@ def _find(law, work, force, h, remaining, allowed, tol, most):
 
 
 @branching_kernel
-def run_rows(law, rows, start, dstart, tol, step_limit, seen):
-    """All rows of held force from a twist (3,), with its derivatives (3, K). Returns the rows done: fewer where more
-    than step_limit steps were solved."""
+def run_rows(law, rows, start, way, dstart, step, tol, step_limit, seen):
+    """All rows of held force from a twist (3,) and a way (W,), with derivatives of the twist (3, K).
+
+    step (1,): the step to begin with [s], which becomes the one to go on with. Returns the rows done: fewer where more
+    than step_limit steps were solved.
+    """
     keys, travel = dstart.shape[1], seen.way.shape[2]
     work = Work(
         start.copy(),
@@ -432,7 +441,8 @@ def run_rows(law, rows, start, dstart, tol, step_limit, seen):
         np.zeros((3, keys)),
     )
     allowed = tol / law.memory
-    begin, h, steps = 0.0, rows.dt[0], 0
+    _copy(work.way[0], way)
+    begin, h, steps = 0.0, step[0], 0
     for r in range(len(rows.dt)):
         force, dforce, remaining, events, knows = rows.force[r], rows.dforce[r], rows.dt[r], 0, False
         now = begin
@@ -462,4 +472,5 @@ def run_rows(law, rows, start, dstart, tol, step_limit, seen):
         begin += rows.dt[r]
         if steps > step_limit:
             return r
+    step[0] = h
     return len(rows.dt)
