@@ -112,7 +112,7 @@ def test_a_start_that_is_none_is_refused():
 def test_rows_in_which_the_solver_hits_its_cap_are_counted_over_the_way(monkeypatch, steps):
     """At once and step by step: a run that did not converge is never silent."""
     monkeypatch.setattr(engine, "capped", lambda outcome: len(outcome.iterations))
-    robot, volts = shaped("ellipse"), np.tile([0.0, 3.0, -3.0], (steps, 1))
+    robot, volts = shaped("wheels"), np.tile([0.0, 3.0, -3.0], (steps, 1))
     live = LiveRobot(robot, 0.02)
     for row in volts:
         live.step(row)

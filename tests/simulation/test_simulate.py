@@ -205,7 +205,7 @@ def test_an_option_of_the_robot_file_is_never_ignored(axebot, old, new, words):
     (reason,) = why_not_exact(robot)
     assert re.search(words, reason)
     run, plain = simulate(robot, DRIVING, 0.01), simulate(axebot, DRIVING, 0.01)
-    assert "implicit engine" in run.source
+    assert "exact engine" not in run.source
     assert np.abs(run.twist - plain.twist).max() > 1e-4
 
 

@@ -25,13 +25,15 @@ from omnidyn.statement import Statement
 class Conditions(NamedTuple):
     """What acts on a robot, beside voltages: whether a speed loop makes these, and whether motors may coast.
 
-    push: a constant wrench on the body [N, N, N m]; tilt: a constant force that stays in the room [N, N].
+    push: a constant wrench on the body [N, N, N m]; tilt: a constant force that stays in the room [N, N]. fixed: one
+    step a row, instead of a tolerance.
     """
 
     speed_loop: bool = False
     coasting: bool = False
     push: tuple[float, float, float] | None = None
     tilt: tuple[float, float] | None = None
+    fixed: bool = False
 
 
 class Motion(NamedTuple):

@@ -18,12 +18,14 @@ from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import start_state
 from omnidyn.simulation.commands import Commands, as_floats, current_bounds, on_ticks
 from omnidyn.simulation.contract import Conditions, Engine, Motion
+from omnidyn.simulation.coulomb.door import moved, run
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
 from omnidyn.simulation.exact.march import ExactMarch, why_not_exact
 from omnidyn.simulation.implicit.march import Outcome, capped, march_workspace, run_implicit
 from omnidyn.simulation.slip.march import SlipOutcome, rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant, wheel_loads
 from omnidyn.simulation.speed_loop import LoopCommands, loop_of, no_loop
+from omnidyn.simulation.way import PATH
 from omnidyn.statement import WARNING, Statement
 
 TOLERANCE = 1e-6
@@ -38,6 +40,7 @@ def choose_engine(robot: Robot, conditions: Conditions, tol: float | None = TOLE
     outside 1e-10..1 m/s, UnsupportedError for a push on wheels that may slip behind a speed loop.
     """
     tolerance = as_tolerance(tol)  # refused for any engine: which one runs is not what the caller chose
+    conditions = conditions._replace(fixed=tolerance == 0.0)
     return next(engine for engine in ENGINES if engine.serves(robot, conditions))(robot, conditions, tolerance)
 
 
@@ -101,6 +104,43 @@ class ExactInductance(_PaperLaw):
         assert commands.voltage is not None
         twists, poses, currents = simulate_exact_inductance(self._robot, commands.voltage, commands.dt, *state)
         return Motion((twists[-1], poses[-1], currents[-1]), twists, poses, commands.voltage, current=currents)
+
+
+class Coulomb:
+    """Friction of constant levels on the body axes or along the direction of travel. State: twist, pose, step [s]."""
+
+    def __init__(self, robot: Robot, conditions: Conditions, tol: float) -> None:
+        known_robot = moved(plant(robot), [], 1.0)
+        assert known_robot is not None
+        self._robot, self._tol, self._push = known_robot, tol, conditions.push
+        self.name = named("Coulomb engine", tol)
+
+    @staticmethod
+    def serves(robot: Robot, conditions: Conditions) -> bool:
+        """Under voltages that are given, at a tolerance."""
+        if conditions.speed_loop or conditions.coasting or conditions.tilt or conditions.fixed:
+            return False
+        return robot.wheels.traction_mu is None and moved(plant(robot), [], 1.0) is not None
+
+    def start(self, twist: FloatArray, pose: FloatArray, current: FloatArray) -> tuple[FloatArray, ...]:
+        """Currents follow from the twist."""
+        return twist, pose, np.zeros(1)
+
+    def advance(self, state: tuple[FloatArray, FloatArray, FloatArray], commands: Commands) -> Motion:
+        """By steps that solve an inclusion; see coulomb/run.py."""
+        (twist, pose, step), dt = state, commands.dt
+        assert commands.voltage is not None
+        push = None if self._push is None else np.tile(self._push, (len(dt), 1))
+        step, t = step.copy() if step[0] else dt[:1].copy(), np.concatenate([[0.0], np.cumsum(dt)])
+        way = np.array([pose[2], 0.0, 0.0, pose[0], pose[1]])
+        seen = run(self._robot, t, dt, commands.voltage, twist, step, self._tol, np.zeros(1), way, push)
+        twists, poses = seen.twist[0], seen.way[0][:, [PATH, PATH + 1, 0]]
+        twists[0], poses[0] = twist, pose
+        return Motion((twists[-1], poses[-1], step), twists, poses, commands.voltage)
+
+    def statements(self, state: Any) -> tuple[Statement, ...]:
+        """Its stages are solved to rounding: it has nothing to warn of."""
+        return ()
 
 
 class Stepped(NamedTuple):
@@ -290,7 +330,7 @@ class Slipping(_Stepping):
         return state.count.statements(self._robot)
 
 
-ENGINES: tuple[type[Engine], ...] = (Exact, ExactInductance, Implicit, Slipping)
+ENGINES: tuple[type[Engine], ...] = (Exact, ExactInductance, Coulomb, Implicit, Slipping)
 
 
 def push_voltage(robot: Robot, conditions: Conditions) -> FloatArray:

@@ -53,8 +53,9 @@ def _least(mass: float, off: float) -> float:
 def _bound_laws(plant: Plant) -> None:
     """What the solvers must know beforehand of what falls with the speed, and of what bends."""
     body = plant.body
-    for row in plant.element:
-        row.steep = (steepest_of(row) + fade_of(row)) * float(row.g @ row.g) / body.least
+    if (plant.element["fall"] > 0.0).any() or (plant.element["fade"] > 0.0).any():
+        for row in plant.element:
+            row.steep = (steepest_of(row) + fade_of(row)) * float(row.g @ row.g) / body.least
     steep = fade_of(body)
     if body.fall > 0.0:
         excess_level = (body.breakaway - body.coulomb).max()

@@ -27,6 +27,8 @@ from omnidyn.model.stick_slip.step_bound import MONOTONE
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, commands, current_bounds
+from omnidyn.simulation.coulomb.door import Moved, moved
+from omnidyn.simulation.coulomb.door import run as run_coulomb
 from omnidyn.simulation.engine import (
     TOLERANCE,
     Implicit,
@@ -50,9 +52,10 @@ from omnidyn.simulation.sensitivity.directions import (
     width,
 )
 from omnidyn.simulation.sensitivity.march import LoopRun, march_with_derivatives, run_loop_with_derivatives
-from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, PATH, SAME_TIME, TURN, Samples, empty_samples
+from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples, empty_samples
 from omnidyn.simulation.simulate import as_run
 from omnidyn.simulation.view import seen_at_once
+from omnidyn.simulation.way import PATH, SAME_TIME, TURN
 
 PIECES, ROUGH_TOLERANCE = 16, 1e-3  # steps in a row, at most; [m/s] the tolerance where they were more
 PATH_AND_TURN = [1, 2, 0]  # of the way, in the order of a twist
@@ -124,9 +127,8 @@ class LateSample:
     def _at_wheels(self, motion: FloatArray, by: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What the wheels make of a motion of the body (rows, 3), and of its derivatives (rows, K, 3)."""
         wheels = self.robot.wheels
-        wheel_derivatives = np.empty((*by.shape[:2], wheels.count))
+        wheel_derivatives = wheel_speed(wheels, by)
         for k, direction in enumerate(self.directions):
-            wheel_derivatives[:, k] = wheel_speed(wheels, by[:, k])
             if direction.up is not None and direction.down is not None and direction.up.wheels != direction.down.wheels:
                 ends = (wheel_speed(end.wheels, motion) for end in (direction.up, direction.down))
                 wheel_derivatives[:, k] += difference(np.array([*ends]))[0]
@@ -173,6 +175,11 @@ def late_samples(
     friction solver hit its cap. Raises InputError for a direction that changes friction or a gear loss which is off.
     """
     (numbers, plants), (t, voltage, start, _) = _plants(robot, directions), program
+    order = sorted(range(len(directions)), key=lambda k: directions[k].up is None)  # first those that change the robot
+    changed = [plants[2 * k + side] for k in order if directions[k].up is not None for side in range(2)]
+    moved_robot = moved(numbers, changed, EPS)
+    if moved_robot is not None:
+        return _coulomb_samples(robot, moved_robot, program, directions, order, late, tol, travel), 0
     rates = np.zeros((len(directions), *voltage.shape))
     first, length = np.zeros((len(directions), width(numbers))), numbers.body.length
     stretch = _stretch(plants)
@@ -193,6 +200,46 @@ def late_samples(
         samples,
     )
     return _looks(robot, directions, samples, (length, stretch), (samples.t, voltage, rates)), capped(outcome)
+
+
+def _coulomb_samples(
+    robot: Robot,
+    moved_robot: Moved,
+    program: VoltageProgram,
+    directions: Sequence[Direction],
+    order: list[int],
+    late: Sequence[float],
+    tol: float | None,
+    travel: int,
+) -> list[LateSample]:
+    """`late_samples` of a robot under Coulomb friction; order: of the directions, first those that change the robot."""
+    t, voltage, start, push = program
+    rates = [{"voltage": d.voltage, "push": d.push, "twist": d.start} for d in (directions[k] for k in order)]
+    dt = held(t, len(voltage), late)
+    seen = run_coulomb(
+        moved_robot,
+        t,
+        dt,
+        voltage,
+        start,
+        dt[:1].copy(),
+        ROUGH_TOLERANCE if tol is None else as_tolerance(tol),
+        np.asarray(late, dtype=float),
+        np.zeros(travel),
+        push,
+        rates,
+        order,
+    )
+    looks = []
+    for c, delay in enumerate(seen.late):
+        at = np.clip(np.searchsorted(seen.t, seen.t - delay + SAME_TIME, side="right") - 1, 0, len(voltage) - 1)
+        dvoltage = np.zeros((len(t), len(directions), voltage.shape[1]))
+        for k, direction in enumerate(directions):
+            if direction.voltage is not None:
+                dvoltage[:, k] = direction.voltage[at]
+        motion = (seen.twist[c], seen.pace[c], seen.way[c], voltage[at], seen.dtwist[c], seen.dway[c], dvoltage)
+        looks.append(LateSample(robot, tuple(directions), float(delay), *motion, None, None, None))
+    return looks
 
 
 def _within(tol: float | None, numbers: Plant, dt: FloatArray) -> float:

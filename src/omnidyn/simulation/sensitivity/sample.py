@@ -6,13 +6,9 @@ weights are the continuous extension of SDIRK2 itself, with b2 = (th^2/2 - gamma
 half steps, the parabola through the three. Both leave h^3, as the step does. See Hairer, Norsett, Wanner, Solving
 Ordinary Differential Equations I, II.6.
 
-Beside the state goes the way since the start: the heading th, the path s that the wheels have rolled along the body's
-own axes, and the place p, both from where the robot stood and along where it faced then,
-
-    th' = omega    s' = v    p' = R(th) v        dp'/dq = R(th) (dv/dq + dth/dq z x v)
-
-The first two are linear in the velocities: their integral over a part of a step is that of the weights. p takes three
-nodes of Simpson's rule. A fit asks for no more of the way than it needs: TURN, PATH or PLACE.
+Beside the state goes the way since the start, see ../way.py. Heading and path are linear in the velocities: their
+integral over a part of a step is that of the weights. The place takes three nodes of Simpson's rule. A fit asks for no
+more of the way than it needs: TURN, PATH or PLACE.
 """
 
 from __future__ import annotations
@@ -28,11 +24,7 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.stick_slip.plant import copy_row, copy_table
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS
-
-SAME_TIME = 1e-9  # [s] times that differ by less are one
-
-
-TURN, PATH, PLACE = 1, 3, 5  # numbers of the way: heading; path along x, y of the body; place along x, y at the start
+from omnidyn.simulation.way import PATH, PLACE, SAME_TIME, TURN
 
 
 class Samples(NamedTuple):

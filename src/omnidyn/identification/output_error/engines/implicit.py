@@ -29,8 +29,8 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.sensitivity.directions import EPS, difference
 from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, VoltageProgram, late_samples
-from omnidyn.simulation.sensitivity.sample import PATH, PLACE, TURN
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
+from omnidyn.simulation.way import PATH, PLACE, TURN
 
 PATH_TOLERANCE = 1e-6  # [m/s] where a path is fitted: what a speed is off by adds up, to a tick of an encoder in 10 s
 STEPS = 2  # a row, of derivatives at the end of a fit; it begins with one

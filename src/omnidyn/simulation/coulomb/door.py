@@ -1,0 +1,107 @@
+"""From plants and voltages to a run of this room."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.errors import InputError
+from omnidyn.model.layout import N_AXES, Plant, many
+from omnidyn.simulation.coulomb.law import couples, drives_of, is_coulomb, kind_of, laws_of
+from omnidyn.simulation.coulomb.run import Law, Rows, Seen, empty_seen, run_rows
+from omnidyn.simulation.way import SAME_TIME
+
+MEMORY_BOUNDS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its memory, within these bounds
+SAME_SHARE = 1e-3  # of the shortest row: times nearer than this are one, or than SAME_TIME
+MOST_STEPS = (1e6, 7e6)  # steps solved at tol 1e-6, and so many more per second simulated; then a run is given up
+
+
+class Moved(NamedTuple):
+    """A robot of this room, and how it changes along directions: see law.py."""
+
+    law: Law
+    drive: FloatArray  # (3, n)
+    drive_change: FloatArray  # (R, 3, n)
+
+
+def moved(numbers: Plant, plants: Sequence[Plant], step: float) -> Moved | None:
+    """The robot, and its derivatives from plants up (2k) and down (2k + 1) each of R directions, by `step`; None where
+    this room does not know one of them."""
+    everyone = many([numbers, *plants])
+    kinds = kind_of(everyone)
+    if couples(numbers) or not is_coulomb(everyone).all() or (kinds != kinds[0]).any():
+        return None
+    laws, drives = laws_of(everyone), drives_of(everyone)
+    change = (laws[1::2] - laws[2::2]).T / (2.0 * step)
+    memory = min(max(float(numbers.body.memory[0]), MEMORY_BOUNDS[0]), MEMORY_BOUNDS[1])
+    law = Law(laws[0].copy(), np.ascontiguousarray(change), int(kinds[0]), memory)
+    return Moved(law, drives[0], (drives[1::2] - drives[2::2]) / (2.0 * step))
+
+
+def run(
+    robot: Moved,
+    t: FloatArray,
+    dt: FloatArray,
+    voltage: FloatArray,
+    twist: FloatArray,
+    step: FloatArray,
+    tol: float,
+    late: FloatArray,
+    way: FloatArray,
+    push: FloatArray | None = None,
+    rates: Sequence[Mapping[str, FloatArray | None]] = (),
+    order: Sequence[int] = (),
+) -> Seen:
+    """A run from a twist under held voltages, seen at t - late, with its derivatives.
+
+    Args:
+        robot: with its derivatives by the first R of K directions.
+        t: of the samples [s], shape (samples,).
+        dt: for how long each voltage holds [s], shape (rows,).
+        voltage: at the motors [V], shape (rows, n).
+        twist: at the start, shape (3,).
+        step: to begin with [s], shape (1,); becomes the one to go on with.
+        tol: of the twist [m/s].
+        late: latencies [s], shape (L,).
+        way: at the start, shape (W,), of as many numbers as are wanted: see ../way.py.
+        push: wrench from outside over each row [N, N, N m], shape (rows, 3).
+        rates: of each of the K directions the derivatives of voltage, push and twist, where there are any.
+        order: the place of each of them in what is seen.
+
+    Raises InputError where motion is so fast beside its duration that no patience would do.
+    """
+    drive, keys = robot.drive, len(rates)
+    force, dforce = voltage @ drive.T, np.zeros((len(dt), N_AXES, keys))
+    changes = robot.drive_change
+    if len(changes):
+        dforce[:, :, : len(changes)] = (
+            (voltage @ changes.reshape(-1, drive.shape[1]).T).reshape(len(dt), len(changes), N_AXES).swapaxes(1, 2)
+        )
+    if push is not None:
+        force = force + push[: len(dt)]
+    dtwist = np.zeros((N_AXES, keys))
+    for k, rate in enumerate(rates):
+        dvoltage, dpush, start = rate.get("voltage"), rate.get("push"), rate.get("twist")
+        if dvoltage is not None:
+            dforce[:, :, k] += dvoltage @ drive.T
+        if dpush is not None:
+            dforce[:, :, k] += dpush[: len(dt)]
+        if start is not None:
+            dtwist[:, k] = start
+    same = min(SAME_TIME, SAME_SHARE * float(dt.min()))
+    seen = empty_seen(t, late, same, np.asarray(order, dtype=np.int64), len(way))
+    limit = (MOST_STEPS[0] + MOST_STEPS[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** 0.25)
+    rows = Rows(np.ascontiguousarray(dt), np.ascontiguousarray(force), dforce)
+    row = run_rows(robot.law, rows, np.array(twist, dtype=float), way, dtwist, step, tol, limit, seen)
+    if row < len(dt):
+        raise InputError(
+            "this robot moves too fast to be followed",
+            got=f"more than {limit:.2g} steps up to row {row}",
+            expected=f"motion that tol = {tol:g} m/s can follow in steps of 100 ns",
+            remedy="check mass, inertia, gear ratio, torque and EMF constant of the robot file; or take one step per "
+            "row (tol=None)",
+        )
+    return seen

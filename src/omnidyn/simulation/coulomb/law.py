@@ -1,0 +1,71 @@
+"""The numbers of a robot whose friction has constant levels, on the body axes or along the direction of travel.
+
+    M v' = P u + push - D v + m omega (v_y, -v_x, 0) - f(v)
+
+v = (v_x, v_y, omega); M diagonal; D: viscous friction and back-EMF; P: force per volt at rest; m: the mass where the
+body frame turns. f: C sgn(v) per axis, or along the direction of travel (model/friction/direction.py).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.model.layout import N_AXES, Plant
+
+MASS, DAMPING, TURNING, FORWARD, BACKWARD, TRAVEL = 0, 9, 18, 19, 22, 25  # places in a law
+SIZE = 27
+BOX, ELLIPSE, PLAIN = 0, 1, 2  # where friction acts in the plane: per axis, along the direction of travel
+
+
+def is_coulomb(plants: Plant) -> BoolArray:
+    """Whether this room knows robots, apart from `couples`: constant levels that hold no more than they slide with,
+    currents that settle at once and meet no limit. Shape (*batch,), as of the plants."""
+    body, element = plants
+    motors, axes = element[..., N_AXES:], element[..., :N_AXES]
+    stays = (body["laws"] == 0.0) & (body["bristles"] == 0.0) & (body["gathers"] == 0.0) & (body["off"] == 0.0)
+    settles = (motors["inductance"] == 0.0) & (motors["drop"] == 0.0) & (motors["efficiency"] == 1.0)
+    free = (motors["active"] == 0.0) & (motors["breakaway"] == 0.0).all(axis=-1) & np.isinf(motors["limit"])
+    one_level = (axes["breakaway"] == axes["coulomb"]).all(axis=(-2, -1))
+    one_level &= (body["breakaway"] == body["coulomb"]).all(axis=-1)
+    both = (body["active"] != 0.0) & (axes["breakaway"][..., :2, :] > 0.0).any(axis=(-2, -1))
+    return stays & one_level & ~both & (settles & free).all(axis=-1) & ~body["room"].any(axis=-1)
+
+
+def couples(plant: Plant) -> bool:
+    """Whether the mass of a robot couples its axes: then a stop may release another axis, which nobody here sees."""
+    return bool(plant.body.spin[~np.eye(N_AXES, dtype=bool)].any())
+
+
+def kind_of(plants: Plant) -> IntArray:
+    """BOX, ELLIPSE or PLAIN. Shape (*batch,)."""
+    body = plants.body
+    return np.where(body["active"] == 0.0, BOX, np.where(body["plain"] != 0.0, PLAIN, ELLIPSE))
+
+
+def laws_of(plants: Plant) -> FloatArray:
+    """The numbers of robots, M and D by rows; yaw in rad/s. Shape (*batch, SIZE)."""
+    body, element = plants
+    units = np.ones((*body.shape, N_AXES))
+    units[..., 2] = body["length"]
+    motors, g = element[..., N_AXES:], element["g"]
+    damping = element["viscous"].copy()
+    damping[..., N_AXES:] += motors["thrust"] * motors["emf"] / motors["resistance"]
+    square = units[..., :, None] * units[..., None, :]
+    mass = body["mass"][..., None, None] * np.eye(N_AXES) + body["spin"]
+    law = np.zeros((*body.shape, SIZE))
+    law[..., MASS:DAMPING] = (mass * square).reshape(*body.shape, 9)
+    law[..., DAMPING:TURNING] = (np.einsum("...ea,...e,...eb->...ab", g, damping, g) * square).reshape(*body.shape, 9)
+    law[..., TURNING] = body["turning"] * body["length"]
+    law[..., FORWARD:BACKWARD] = element["coulomb"][..., :N_AXES, 0] * units
+    law[..., BACKWARD:TRAVEL] = element["coulomb"][..., :N_AXES, 1] * units
+    law[..., TRAVEL:] = body["coulomb"]
+    return law
+
+
+def drives_of(plants: Plant) -> FloatArray:
+    """P [N/V, N/V, N m/V]. Shape (*batch, 3, wheels)."""
+    motors = plants.element[..., N_AXES:]
+    drive = np.swapaxes(motors["g"], -1, -2) * (motors["thrust"] / motors["resistance"])[..., None, :]
+    drive[..., 2, :] *= plants.body["length"][..., None]
+    return drive
