@@ -254,6 +254,9 @@ SENTENCES = {
             "fitted",
         )
     ),
+    "latency_like_zero": Sentence(
+        "{subject} of {latency:m.2g} ms (std {std:m.2g} ms) is not distinguishable from 0: none is written"
+    ),
     "harmful_nuisance": Sentence(
         "{subject} improves the likelihood but worsens the prediction of held-out blocks of the log: it is not fitted"
     ),

@@ -19,7 +19,7 @@ from omnidyn.identification.grouping import count_once
 from omnidyn.identification.methods import AUTO, OutputError, degrees
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import ALL_LOGS, begun, group_names
-from omnidyn.identification.output_error.choice import beside_given, best_with_force, better_of, why_white
+from omnidyn.identification.output_error.choice import FORCE_ERRORS, beside_given, best_with_force, better_of, why_white
 from omnidyn.identification.output_error.conclusion import conclude, loss_words, unexplained
 from omnidyn.identification.output_error.joint import join, joint_start, own_names
 from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
@@ -38,7 +38,7 @@ from omnidyn.identification.output_error.solve.first_point import coarse_point, 
 from omnidyn.identification.output_error.solve.loop import FINE_TOLERANCE as LOOP_FINE
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Best, FitProgress
-from omnidyn.identification.output_error.solve.solver import NEAR_PRECISION, Normal, Solution, Solver
+from omnidyn.identification.output_error.solve.solver import MAX_ITERATIONS, NEAR_PRECISION, Normal, Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_levels, find_breakaway
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import beside, differences, refuse_bootstrap, resampled
@@ -55,6 +55,11 @@ HALFWAY_TOLERANCE = 3e-4  # [m/s] tolerance of the implicit engine on the way th
 FIT_PRECISION = (
     2.5e-3  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
 )
+
+
+SCREENING_STEPS = 3  # of a fit with a constant force, before it is known whether it pays
+FORCE_GAIN = 0.5 * FORCE_ERRORS**2  # of the likelihood, below which a constant force is none
+FORCE_SHARE = 0.5  # of what the better one gains: a constant force that gains less predicts no better
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,15 +326,29 @@ class Fit:
         chosen_solution = better_of(solution, self._plain(solution, progress))
         if trust(chosen_solution.solver, chosen_solution, AUTO).kind != SANDWICH:
             return chosen_solution
-        names, inner_progress = (
-            chosen_solution.solver.problem.nuisances,
-            progress.aside("once more with a constant force"),
-        )
+        inner_progress = progress.aside("once more with a constant force")
         try:
-            forced_solutions = [self.beside(chosen_solution, [*names, force], inner_progress) for force in (PUSH, TILT)]
+            forced_solutions = self._forced(chosen_solution, inner_progress)
         except UnsupportedError:  # an engine that knows no constant force
             return chosen_solution
-        return best_with_force(chosen_solution, forced_solutions)
+        return best_with_force(chosen_solution, forced_solutions) if forced_solutions else chosen_solution
+
+    def _forced(self, chosen_solution: Solution, progress: FitProgress) -> list[Solution]:
+        """The fits with a constant force in the body, and in the room, that may be taken: a few steps screen them.
+
+        Raises UnsupportedError for an engine that knows no constant force.
+        """
+        names, objective = chosen_solution.solver.problem.nuisances, chosen_solution.state.objective
+        begun_fits = [
+            self.beside(chosen_solution, [*names, force], progress, SCREENING_STEPS) for force in (PUSH, TILT)
+        ]
+        gains = [objective - begun_fit.least_objective for begun_fit in begun_fits]
+        least_gain = max(FORCE_GAIN, FORCE_SHARE * max(gains))
+        return [
+            begun_fit.gone_on(progress)
+            for begun_fit, gain in zip(begun_fits, gains, strict=True)
+            if gain >= least_gain
+        ]
 
     def _plain(self, solution: Solution, progress: FitProgress) -> Solution:
         """The fit of the only group without nuisances, but for the gain of a nominal supply; the fit itself where it
@@ -341,10 +360,16 @@ class Fit:
         kept_names = [name for name in names if name == GAIN]
         return self.beside(solution, kept_names, progress.aside(f"once more without {', '.join(lost)}"))
 
-    def beside(self, base_solution: Solution, nuisances: Sequence[str], progress: FitProgress) -> Solution:
-        """The fit of the only group with these nuisances, in the rows of another fit."""
+    def beside(
+        self,
+        base_solution: Solution,
+        nuisances: Sequence[str],
+        progress: FitProgress,
+        limit: int = MAX_ITERATIONS,
+    ) -> Solution:
+        """The fit of the only group with these nuisances, in the rows of another fit. limit: of its steps."""
         problem = replace(self.groups[0].problem(nuisances), pieces=base_solution.solver.problem.pieces)
-        return self._solve(self.groups[0], problem, progress, base_solution)
+        return self._solve(self.groups[0], problem, progress, base_solution, limit)
 
     def _with_latencies_only(self, solution: Solution, progress: FitProgress) -> Solution | None:
         """The fit of one group without other automatic nuisances; None where there are none, or they were asked for.
@@ -362,10 +387,15 @@ class Fit:
         return replace(simpler_solution, notes=(*solution.notes, note))
 
     def _solve(
-        self, group: Group, problem: Problem, progress: FitProgress, base_solution: Solution | None = None
+        self,
+        group: Group,
+        problem: Problem,
+        progress: FitProgress,
+        base_solution: Solution | None = None,
+        limit: int = MAX_ITERATIONS,
     ) -> Solution:
         """The best point of one group alone. base_solution: a fit of it with other nuisances, at whose end an engine
-        that marches by steps begins."""
+        that marches by steps begins, and takes at most `limit` steps."""
         if group.engine.has_loop:
             return solve_loop(problem, self.nu, progress)
         engine = group.engine.of(problem, FINE_TOLERANCE)
@@ -376,7 +406,7 @@ class Fit:
         solver = Solver(problem, engine, self.nu, FIT_PRECISION)
         if base_solution is not None:
             scales = base_solution.state.variance if self.nu else None
-            return solver.minimise(point_of(base_solution, problem), progress=progress, scales=scales)
+            return solver.minimise(point_of(base_solution, problem), limit, progress, scales=scales)
         coarse_state = coarse_point(problem, self.nu, progress)
         halfway_engine = group.engine.of(problem, HALFWAY_TOLERANCE)
         nearer_solution = Solver(problem, halfway_engine, self.nu, NEAR_PRECISION, counts_ticks=False).minimise(

@@ -74,6 +74,18 @@ class Solution:
     notes: tuple[Statement, ...] = ()
     plain_solution: Solution | None = None
 
+    @property
+    def least_objective(self) -> float:
+        """F at the best point, as far as it is seen from here."""
+        return self.state.objective - 0.5 * Normal(self.solver, self.state).distance_without(self.held_parameters)
+
+    def gone_on(self, progress: Progress | None = None) -> Solution:
+        """The same with as many steps as it takes."""
+        if self.converged:
+            return self
+        scales = self.state.variance if self.solver.scaled.any() else None
+        return self.solver.minimise(self.state, MAX_ITERATIONS, progress, self.blocked_parameters, scales)
+
 
 class Solver(Generic[P]):
     """Minimises F over a problem. `floor` (columns,): least variance of each column.
