@@ -35,7 +35,7 @@ from omnidyn.statistics import difference_noise
 from omnidyn.simulation.way import PATH, PLACE, TURN
 
 PATH_TOLERANCES = (1e-6, 1e-4)  # [m/s] where a path is fitted, and what a speed is off by adds up
-PATH_SHARE = 0.15  # standard errors that the tolerance may move a fit by
+PATH_SHARE = 0.05  # standard errors that the tolerance may move a fit by
 PATH_ERROR = 2.5e-3  # [sqrt(s)] error of a path after a time T over tol sqrt(T), measured
 SPEED_TOLERANCE = 1e-5  # [m/s] that is asked for at the end of a fit to speeds; a path has that much more or less
 STEPS = 2  # a row, of derivatives at the end of a fit; it begins with one

@@ -24,7 +24,7 @@ from omnidyn.statement import Statement
 MAX_ITERATIONS = 60
 END_PRECISION = 1e-5  # squared distance to the best point, in standard errors, at which it ends
 KINK_PRECISION = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
-NEAR_PRECISION = 1.0  # the same from where a descent goes on by another likelihood, or by shorter steps
+NEAR_PRECISION = 10.0  # the same from where a descent goes on by another likelihood, or by shorter steps
 LEAST_STEP = 0.3  # share of a step that is too long: what is less long goes another way
 SCATTER = 1e-2  # of F by an engine that marches by steps: a difference below it says nothing, but a gradient does
 CREEP, STEPS = 3.0, 2  # times `close`, that so many steps in a row each lower F by less than: they creep along a kink
