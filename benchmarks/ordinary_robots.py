@@ -47,15 +47,11 @@ class Robot:
 
 def robots() -> tuple[Robot, ...]:
     """Those of the table."""
-    four = World(
-        FOUR, (0.05,) * 4, (0.19,) * 4, 6.2, 0.11, 1.6, 0.021, 20.0, 12.6, (14.0, 14.0, 1.4), (2.7, 2.7, 0.08)
-    )
+    four = World(FOUR, (0.05,) * 4, (0.19,) * 4, 6.2, 0.11, 1.6, 0.021, 20.0, 12.6, (14.0, 14.0, 1.4), (2.7, 2.7, 0.08))
     three = World(
         THREE, (0.03,) * 3, (0.11,) * 3, 2.4, 0.016, 2.2, 0.0105, 24.0, 12.0, (3.9, 3.9, 0.2), (1.2, 1.2, 0.012)
     )
-    five = World(
-        FIVE, (0.04,) * 5, (0.17,) * 5, 7.0, 0.12, 1.8, 0.018, 22.0, 12.0, (13.0, 13.0, 1.1), (3.0, 3.0, 0.08)
-    )
+    five = World(FIVE, (0.04,) * 5, (0.17,) * 5, 7.0, 0.12, 1.8, 0.018, 22.0, 12.0, (13.0, 13.0, 1.1), (3.0, 3.0, 0.08))
     mecanum = World(
         **MECANUM,
         wheel_radius=(0.0508,) * 4,
@@ -101,9 +97,7 @@ def robots() -> tuple[Robot, ...]:
         ),
         Robot("lekiwi", "LeKiwi, driven by volts; wheel speeds", lekiwi, Sensors(speeds=0.03)),
         Robot("quick", "four omni wheels, yaw forgets within 2 ms; volts, wheel speeds", quick, Sensors(speeds=0.05)),
-        Robot(
-            "wheels", "three omni wheels, friction at the wheels: the exception", wheels, Sensors(speeds=0.05), 1.6
-        ),
+        Robot("wheels", "three omni wheels, friction at the wheels: the exception", wheels, Sensors(speeds=0.05), 1.6),
     )
 
 

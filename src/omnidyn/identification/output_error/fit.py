@@ -346,9 +346,7 @@ class Fit:
         gains = [objective - begun_fit.least_objective for begun_fit in begun_fits]
         least_gain = max(FORCE_GAIN, FORCE_SHARE * max(gains))
         return [
-            begun_fit.gone_on(progress)
-            for begun_fit, gain in zip(begun_fits, gains, strict=True)
-            if gain >= least_gain
+            begun_fit.gone_on(progress) for begun_fit, gain in zip(begun_fits, gains, strict=True) if gain >= least_gain
         ]
 
     def _plain(self, solution: Solution, progress: FitProgress) -> Solution:

@@ -31,8 +31,8 @@ from omnidyn.model.robot import Robot
 from omnidyn.simulation.sensitivity.directions import EPS, difference
 from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, VoltageProgram, late_samples
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
-from omnidyn.statistics import difference_noise
 from omnidyn.simulation.way import PATH, PLACE, TURN
+from omnidyn.statistics import difference_noise
 
 PATH_TOLERANCES = (1e-6, 1e-4)  # [m/s] where a path is fitted, and what a speed is off by adds up
 PATH_SHARE = 0.05  # standard errors that the tolerance may move a fit by

@@ -3,7 +3,7 @@
 A motion shows what a voltage pushes with, l K_t/(R r), and what brakes, l^2 K_t K_v/(R r^2) + B, not their parts: a
 longer gear with more resistance and less viscous friction moves the same way. Priors alone tell such robots apart. A
 straight step of logarithms leaves that valley: B must fall by what a product of them grows by. So a step is bent until
-mass, push and braking change by as much as their slopes say (the second-order part of geodesic acceleration, of the
+push and braking change by as much as their slopes say (the second-order part of geodesic acceleration, of the
 numbers of the robot alone: M. K. Transtrum, J. P. Sethna, arXiv:1201.5885).
 """
 
@@ -33,10 +33,8 @@ def bent(problem: Problem, inner: FloatArray, step: FloatArray) -> FloatArray:
         return _sums(problem.robot_at(np.array([p.outer(float(z)) for p, z in zip(parameters, numbers, strict=True)])))
 
     start, sizes = at(here), EPS * np.maximum(np.abs(here), 1e-3)
-    slopes = np.stack(
-        [(at(here + shift) - at(here - shift)) / (2.0 * size) for shift, size in zip(np.diag(sizes), sizes, strict=True)],
-        axis=1,
-    )
+    changes = [at(here + move) - at(here - move) for move in np.diag(sizes)]
+    slopes = np.stack(changes, axis=1) / (2.0 * sizes)
     back = np.abs(way)[:, None] * np.linalg.pinv(slopes * np.abs(way), rcond=RANK)  # what does not move stays
     goal, there = start + slopes @ way, here + way
     for _ in range(ROUNDS):
@@ -47,11 +45,10 @@ def bent(problem: Problem, inner: FloatArray, step: FloatArray) -> FloatArray:
 
 
 def _sums(robot: Robot) -> FloatArray:
-    """What the motion shows of masses, motors and viscous friction."""
+    """What the motion shows of motors and viscous friction: force per volt of each wheel, and braking (3, 3)."""
     body, element = plant(robot)
     motors, units = element[N_AXES:], np.array([1.0, 1.0, body.length])
     push, damping = motors["thrust"] / motors["resistance"], element["viscous"].copy()
     damping[N_AXES:] += push * motors["emf"]
-    braking = (element["g"].T * damping) @ element["g"]
-    mass = body.mass * np.eye(N_AXES) + body.spin
-    return np.concatenate([push, (braking * np.outer(units, units)).ravel(), (mass * np.outer(units, units)).ravel()])
+    braking = (element["g"].T * damping) @ element["g"] * np.outer(units, units)
+    return np.concatenate([push, braking.ravel()])

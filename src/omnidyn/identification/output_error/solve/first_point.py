@@ -94,9 +94,7 @@ def coarse_point(problem: Problem, nu: float, progress: FitProgress) -> State:
     if short is problem:
         return solver.minimise(start_point, progress=progress).state
     short_point = (
-        _by_row(short, nu)
-        .minimise(start_point, progress=progress.aside("a part of the log first"))
-        .state.point
+        _by_row(short, nu).minimise(start_point, progress=progress.aside("a part of the log first")).state.point
     )
     states = [solver.state(point) for point in (start_point, short_point)]
     return solver.minimise(min(states, key=lambda state: state.objective).point, progress=progress).state

@@ -190,7 +190,9 @@ class Solver(Generic[P]):
                     damping, still_parameters, bend.beside(normal.information, still_parameters), shift, share
                 )
                 trial = self.state(moved_point, state.variance if self.scaled.any() else None)
-                is_better = trial.objective < state.objective or self._is_nearer(trial, state, distance, still_parameters)
+                is_better = trial.objective < state.objective or self._is_nearer(
+                    trial, state, distance, still_parameters
+                )
                 if not is_better and damping == 0.0 and share > LEAST_STEP and share * distance > self._kink:
                     share, is_halved = 0.5 * share, True  # a valley: shorter, but the same way
                     continue
