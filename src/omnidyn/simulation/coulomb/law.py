@@ -63,9 +63,14 @@ def laws_of(plants: Plant) -> FloatArray:
     return law
 
 
+def rims_of(plants: Plant) -> FloatArray:
+    """Speed of the rims of the wheels by the twist [m/s by m/s, m/s, rad/s]. Shape (*batch, wheels, 3)."""
+    rims = plants.element["g"][..., N_AXES:, :].copy()
+    rims[..., 2] *= plants.body["length"][..., None]
+    return rims
+
+
 def drives_of(plants: Plant) -> FloatArray:
     """P [N/V, N/V, N m/V]. Shape (*batch, 3, wheels)."""
     motors = plants.element[..., N_AXES:]
-    drive = np.swapaxes(motors["g"], -1, -2) * (motors["thrust"] / motors["resistance"])[..., None, :]
-    drive[..., 2, :] *= plants.body["length"][..., None]
-    return drive
+    return np.swapaxes(rims_of(plants), -1, -2) * (motors["thrust"] / motors["resistance"])[..., None, :]
