@@ -79,7 +79,9 @@ def run(
     Raises InputError where motion is so fast beside its duration that no patience would do.
     """
     drive, keys = robot.drive, len(rates)
-    force, dforce = voltage @ drive.T, np.zeros((len(dt), N_AXES, keys))
+    force, dforce = np.zeros((len(dt), N_AXES)), np.zeros((len(dt), N_AXES, keys))
+    for w in range(drive.shape[1]):  # in this order: what mirrors cancels to the last bit
+        force += voltage[:, w, None] * drive[:, w]
     changes = robot.drive_change
     if len(changes):
         dforce[:, :, : len(changes)] = (
