@@ -16,9 +16,9 @@ from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import start_state
-from omnidyn.simulation.commands import Commands, as_floats, current_bounds, on_ticks
+from omnidyn.simulation.commands import Commands, as_floats, current_bounds, loop_gains, on_ticks
 from omnidyn.simulation.contract import Conditions, Engine, Motion
-from omnidyn.simulation.coulomb.door import moved, run
+from omnidyn.simulation.coulomb.door import moved, run, run_looped
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
 from omnidyn.simulation.exact.march import ExactMarch, why_not_exact
 from omnidyn.simulation.implicit.march import Outcome, capped, march_workspace, run_implicit
@@ -106,43 +106,6 @@ class ExactInductance(_PaperLaw):
         return Motion((twists[-1], poses[-1], currents[-1]), twists, poses, commands.voltage, current=currents)
 
 
-class Coulomb:
-    """Friction of constant levels on the body axes or along the direction of travel. State: twist, pose, step [s]."""
-
-    def __init__(self, robot: Robot, conditions: Conditions, tol: float) -> None:
-        known_robot = moved(plant(robot), [], 1.0)
-        assert known_robot is not None
-        self._robot, self._tol, self._push = known_robot, tol, conditions.push
-        self.name = named("Coulomb engine", tol)
-
-    @staticmethod
-    def serves(robot: Robot, conditions: Conditions) -> bool:
-        """Under voltages that are given, at a tolerance."""
-        if conditions.speed_loop or conditions.coasting or conditions.tilt or conditions.fixed:
-            return False
-        return robot.wheels.traction_mu is None and moved(plant(robot), [], 1.0) is not None
-
-    def start(self, twist: FloatArray, pose: FloatArray, current: FloatArray) -> tuple[FloatArray, ...]:
-        """Currents follow from the twist."""
-        return twist, pose, np.zeros(1)
-
-    def advance(self, state: tuple[FloatArray, FloatArray, FloatArray], commands: Commands) -> Motion:
-        """By steps that solve an inclusion; see coulomb/run.py."""
-        (twist, pose, step), dt = state, commands.dt
-        assert commands.voltage is not None
-        push = None if self._push is None else np.tile(self._push, (len(dt), 1))
-        step, t = step.copy() if step[0] else dt[:1].copy(), np.concatenate([[0.0], np.cumsum(dt)])
-        way = np.array([pose[2], 0.0, 0.0, pose[0], pose[1]])
-        seen = run(self._robot, t, dt, commands.voltage, twist, step, self._tol, np.zeros(1), way, push)
-        twists, poses = seen.twist[0], seen.way[0][:, [PATH, PATH + 1, 0]]
-        twists[0], poses[0] = twist, pose
-        return Motion((twists[-1], poses[-1], step), twists, poses, commands.voltage)
-
-    def statements(self, state: Any) -> tuple[Statement, ...]:
-        """Its stages are solved to rounding: it has nothing to warn of."""
-        return ()
-
-
 class Stepped(NamedTuple):
     """A state of an engine that solves steps, `motion` being its own. now [s]: since the start; asked [V], total [V]:
     the voltages and the integrals of the speed loop, shape (wheels,); count: what the solver met."""
@@ -206,6 +169,67 @@ class _Stepping:
             return rows.voltage, None
         loop_volts = rows.voltage[rows.first]
         return reaching(self._robot, loop_volts), loop_volts
+
+
+class Coulomb(_Stepping):
+    """Friction of constant levels on the body axes or along the direction of travel. motion: twist, step [s]."""
+
+    kind = "Coulomb engine"
+
+    def __init__(self, robot: Robot, conditions: Conditions, tol: float) -> None:
+        super().__init__(robot, conditions, tol)
+        known_robot = moved(plant(robot), [], 1.0)
+        assert known_robot is not None
+        self._moved, self._push = known_robot, conditions.push
+
+    @staticmethod
+    def serves(robot: Robot, conditions: Conditions) -> bool:
+        """At a tolerance, while no motor coasts."""
+        if conditions.coasting or conditions.tilt or conditions.fixed:
+            return False
+        return robot.wheels.traction_mu is None and moved(plant(robot), [], 1.0) is not None
+
+    def start(self, twist: FloatArray, pose: FloatArray, current: FloatArray) -> Stepped:
+        """Currents follow from the twist."""
+        return self._begin((twist, np.zeros(1)), pose, None)
+
+    def advance(self, state: Stepped, commands: Commands) -> Motion:
+        """By steps that solve an inclusion; see coulomb/run.py."""
+        (twist, step), pose, looped = state.motion, state.pose, commands.set_point is not None
+        rows, edges = self._rows(state, commands), np.zeros(len(commands.dt) + 1)
+        np.cumsum(commands.dt, out=edges[1:])
+        step = step.copy() if step[0] else rows.dt[:1].copy()
+        way, late = np.array([pose[2], 0.0, 0.0, pose[0], pose[1]]), np.zeros(1)
+        if looped:
+            gains, none = np.array(loop_gains(self._robot)), np.zeros((0, 4, self._robot.wheels.count))
+            run_of_loop = run_looped(
+                self._moved,
+                gains,
+                none,
+                rows.loop,
+                state.asked,
+                edges,
+                rows.dt,
+                twist,
+                step,
+                self._tol,
+                late,
+                way,
+                None if self._push is None else np.array(self._push),
+            )
+            seen = run_of_loop.seen
+            rows = rows._replace(voltage=run_of_loop.ask, loop=rows.loop._replace(sum=run_of_loop.sum))
+        else:
+            push = None if self._push is None else np.tile(self._push, (len(rows.dt), 1))
+            seen = run(self._moved, edges, rows.dt, rows.voltage, twist, step, self._tol, late, way, push)
+        twists, poses = seen.twist[0], seen.way[0][:, [PATH, PATH + 1, 0]]
+        twists[0], poses[0] = twist, pose
+        volts, loop_volts = self._volts(rows, looped)
+        return Motion(self._after(state, (twists[-1], step), poses[-1], rows, None), twists, poses, volts, loop_volts)
+
+    def statements(self, state: Any) -> tuple[Statement, ...]:
+        """Its stages are solved to rounding: it has nothing to warn of."""
+        return ()
 
 
 class Implicit(_Stepping):

@@ -17,7 +17,7 @@ from omnidyn.simulation.sensitivity.late_sample import Direction, VoltageProgram
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.way import PATH, PLACE
 from tests.reference.modes import reference
-from tests.support.friction_shapes import AXEBOT
+from tests.support.friction_shapes import AXEBOT, implicit
 
 YAW = {"yaw_coulomb": 1.4, "yaw_viscous": 0.05}
 ELLIPSE = DirectionFriction(coulomb=(14.0, 11.0), viscous=2.0, **YAW)
@@ -100,7 +100,7 @@ def test_derivatives_are_those_of_the_general_engine(name):
     """At tolerance 1e-8, of ten numbers and more: within 1e-3, half of them within 1e-5."""
     robot = ROBOTS[name]
     keys, voltage = keys_of(robot), program(robot, 250, 2)
-    true = derivatives(robot, voltage, 0.01, keys, tol=1e-8)
+    true = derivatives(implicit(robot), voltage, 0.01, keys, tol=1e-8)
     ready, t = prepared(robot, keys), np.arange(251) * 0.01
     directions = [Direction(key, *ready.robots[2 * k : 2 * k + 2]) for k, key in enumerate(keys)]
     (seen,), _ = late_samples(robot, VoltageProgram(t, voltage, np.zeros(3)), directions, [0.0], 1e-7, PLACE)
@@ -126,7 +126,7 @@ def test_a_look_between_steps_is_that_of_a_finer_grid(name):
         robot, VoltageProgram(t, voltage, np.zeros(3)), directions, [0.0, late, 0.012, -0.004], 1e-8, PLACE
     )
     cut = np.tile([0.01 - late, late], 120)
-    fine = derivatives(robot, np.repeat(voltage, 2, axis=0), cut, keys, tol=1e-8)
+    fine = derivatives(implicit(robot), np.repeat(voltage, 2, axis=0), cut, keys, tol=1e-8)
     seen, rows = looks[1], slice(1, 240, 2)
     assert np.abs(seen.twist[1:] - fine.run.twist[rows]).max() <= 2e-6
     assert np.abs(seen.way[1:, PATH:] - fine.run.pose[rows, :2]).max() <= 1e-6

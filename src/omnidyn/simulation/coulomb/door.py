@@ -10,12 +10,13 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.layout import N_AXES, Plant, many
-from omnidyn.simulation.coulomb.law import couples, drives_of, is_coulomb, kind_of, laws_of
-from omnidyn.simulation.coulomb.run import Law, Rows, Seen, empty_seen, run_rows
+from omnidyn.simulation.coulomb.law import couples, drives_of, is_coulomb, kind_of, laws_of, rims_of
+from omnidyn.simulation.coulomb.run import Law, Loop, Rows, Seen, empty_seen, new_work, run_loop, run_rows
+from omnidyn.simulation.speed_loop import LoopCommands
 from omnidyn.simulation.way import SAME_TIME
 
 MEMORY_BOUNDS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its memory, within these bounds
-SAME_SHARE = 1e-3  # of the shortest row: times nearer than this are one, or than SAME_TIME
+SAME_SHARE = 0.1  # of the shortest row: times nearer than this are one, or than SAME_TIME
 MOST_STEPS = (1e6, 7e6)  # steps solved at tol 1e-6, and so many more per second simulated; then a run is given up
 
 
@@ -25,6 +26,8 @@ class Moved(NamedTuple):
     law: Law
     drive: FloatArray  # (3, n)
     drive_change: FloatArray  # (R, 3, n)
+    rim: FloatArray  # (n, 3)
+    rim_change: FloatArray  # (R, n, 3)
 
 
 def moved(numbers: Plant, plants: Sequence[Plant], step: float) -> Moved | None:
@@ -38,7 +41,9 @@ def moved(numbers: Plant, plants: Sequence[Plant], step: float) -> Moved | None:
     change = (laws[1::2] - laws[2::2]).T / (2.0 * step)
     memory = min(max(float(numbers.body.memory[0]), MEMORY_BOUNDS[0]), MEMORY_BOUNDS[1])
     law = Law(laws[0].copy(), np.ascontiguousarray(change), int(kinds[0]), memory)
-    return Moved(law, drives[0], (drives[1::2] - drives[2::2]) / (2.0 * step))
+    rims = rims_of(everyone)
+    drive_change, rim_change = (drives[1::2] - drives[2::2]) / (2.0 * step), (rims[1::2] - rims[2::2]) / (2.0 * step)
+    return Moved(law, drives[0], drive_change, rims[0], rim_change)
 
 
 def run(
@@ -74,7 +79,9 @@ def run(
     Raises InputError where motion is so fast beside its duration that no patience would do.
     """
     drive, keys = robot.drive, len(rates)
-    force, dforce = voltage @ drive.T, np.zeros((len(dt), N_AXES, keys))
+    force, dforce = np.zeros((len(dt), N_AXES)), np.zeros((len(dt), N_AXES, keys))
+    for w in range(drive.shape[1]):  # in this order: what mirrors cancels to the last bit
+        force += voltage[:, w, None] * drive[:, w]
     changes = robot.drive_change
     if len(changes):
         dforce[:, :, : len(changes)] = (
@@ -91,11 +98,85 @@ def run(
             dforce[:, :, k] += dpush[: len(dt)]
         if start is not None:
             dtwist[:, k] = start
-    same = min(SAME_TIME, SAME_SHARE * float(dt.min()))
-    seen = empty_seen(t, late, same, np.asarray(order, dtype=np.int64), len(way))
-    limit = (MOST_STEPS[0] + MOST_STEPS[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** 0.25)
+    seen = empty_seen(t, late, min(SAME_TIME, SAME_SHARE * float(dt.min())), np.asarray(order, np.int64), len(way))
     rows = Rows(np.ascontiguousarray(dt), np.ascontiguousarray(force), dforce)
-    row = run_rows(robot.law, rows, np.array(twist, dtype=float), way, dtwist, step, tol, limit, seen)
+    limit = _most_steps(dt, tol)
+    _refuse_run_away(run_rows(robot.law, rows, new_work(twist, way, dtwist), step, tol, limit, seen), dt, tol, limit)
+    return seen
+
+
+class Looped(NamedTuple):
+    """A run behind a speed loop. ask [V]: what the loop asks for in each of J intervals (J, n); dask: its derivatives
+    (K, J, n); sum [V]: the integral at the end (n,)."""
+
+    seen: Seen
+    ask: FloatArray
+    dask: FloatArray
+    sum: FloatArray
+
+
+def run_looped(
+    robot: Moved,
+    gains: FloatArray,
+    dgains: FloatArray,
+    loop: LoopCommands,
+    before: FloatArray,
+    t: FloatArray,
+    dt: FloatArray,
+    twist: FloatArray,
+    step: FloatArray,
+    tol: float,
+    late: FloatArray,
+    way: FloatArray,
+    push: FloatArray | None = None,
+    dcommand: FloatArray | None = None,
+) -> Looped:
+    """A run behind the firmware's speed loop, with its derivatives by K numbers of the robot, which rested before.
+
+    Args:
+        robot: with these derivatives.
+        gains, dgains: kp, ki, limit and radius of each wheel, (4, n), and their derivatives (K, 4, n).
+        loop: the commands of each interval (J, n), whether it begins with a tick, and the integral so far.
+        before: what the loop has asked for until its first tick [V], shape (n,).
+        t, dt, twist, step, tol, late, way: as of `run`, of J intervals.
+        push: wrench from outside [N, N, N m], shape (3,).
+        dcommand: derivatives of the commands, shape (K, J, n).
+
+    Raises InputError where motion is so fast beside its duration that no patience would do.
+    """
+    keys, n = len(dgains), gains.shape[1]
+    seen = empty_seen(t, late, SAME_TIME, np.arange(keys), len(way))
+    whole = Loop(
+        gains,
+        dgains,
+        robot.rim,
+        robot.rim_change,
+        np.ascontiguousarray(robot.drive),
+        np.ascontiguousarray(robot.drive_change),
+        np.ascontiguousarray(loop.command),
+        np.zeros((0, 0, n)) if dcommand is None else np.ascontiguousarray(dcommand),
+        loop.tick,
+        np.zeros(N_AXES) if push is None else np.array(push, dtype=float),
+        loop.period,
+        loop.dead,
+        loop.sum.copy(),
+        np.zeros((keys, n)),
+        np.zeros((len(dt), n)),
+        np.zeros((keys, len(dt), n)),
+    )
+    work, limit = new_work(twist, way, np.zeros((N_AXES, keys))), _most_steps(dt, tol)
+    dt = np.ascontiguousarray(dt)
+    row = run_loop(robot.law, dt, whole, before, np.zeros((keys, n)), work, step, tol, limit, seen)
+    _refuse_run_away(row, dt, tol, limit)
+    return Looped(seen, whole.ask, whole.dask, whole.sum)
+
+
+def _most_steps(dt: FloatArray, tol: float) -> float:
+    return (MOST_STEPS[0] + MOST_STEPS[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** 0.25)
+
+
+def _refuse_run_away(row: int, dt: FloatArray, tol: float, limit: float) -> None:
+    """Raises InputError where a run was given up in a row."""
     if row < len(dt):
         raise InputError(
             "this robot moves too fast to be followed",
@@ -104,4 +185,3 @@ def run(
             remedy="check mass, inertia, gear ratio, torque and EMF constant of the robot file; or take one step per "
             "row (tol=None)",
         )
-    return seen

@@ -15,6 +15,7 @@ from omnidyn.model.layout import N_AXES, Plant
 
 MASS, DAMPING, TURNING, FORWARD, BACKWARD, TRAVEL = 0, 9, 18, 19, 22, 25  # places in a law
 SIZE = 27
+ROUNDING = 1e-12  # of the axes that it couples, a number that is not there
 BOX, ELLIPSE, PLAIN = 0, 1, 2  # where friction acts in the plane: per axis, along the direction of travel
 
 
@@ -34,7 +35,7 @@ def is_coulomb(plants: Plant) -> BoolArray:
 
 def couples(plant: Plant) -> bool:
     """Whether the mass of a robot couples its axes: then a stop may release another axis, which nobody here sees."""
-    return bool(plant.body.spin[~np.eye(N_AXES, dtype=bool)].any())
+    return bool(laws_of(plant)[MASS:DAMPING].reshape(N_AXES, N_AXES)[~np.eye(N_AXES, dtype=bool)].any())
 
 
 def kind_of(plants: Plant) -> IntArray:
@@ -52,10 +53,13 @@ def laws_of(plants: Plant) -> FloatArray:
     damping = element["viscous"].copy()
     damping[..., N_AXES:] += motors["thrust"] * motors["emf"] / motors["resistance"]
     square = units[..., :, None] * units[..., None, :]
+    damped = np.zeros((*body.shape, N_AXES, N_AXES))
+    for e in range(element.shape[-1]):  # in this order: what mirrors cancels to the last bit
+        damped += g[..., e, :, None] * g[..., e, None, :] * damping[..., e, None, None]
     mass = body["mass"][..., None, None] * np.eye(N_AXES) + body["spin"]
     law = np.zeros((*body.shape, SIZE))
-    law[..., MASS:DAMPING] = (mass * square).reshape(*body.shape, 9)
-    law[..., DAMPING:TURNING] = (np.einsum("...ea,...e,...eb->...ab", g, damping, g) * square).reshape(*body.shape, 9)
+    law[..., MASS:DAMPING] = _without_rounding(mass * square).reshape(*body.shape, 9)
+    law[..., DAMPING:TURNING] = _without_rounding(damped * square).reshape(*body.shape, 9)
     law[..., TURNING] = body["turning"] * body["length"]
     law[..., FORWARD:BACKWARD] = element["coulomb"][..., :N_AXES, 0] * units
     law[..., BACKWARD:TRAVEL] = element["coulomb"][..., :N_AXES, 1] * units
@@ -63,9 +67,20 @@ def laws_of(plants: Plant) -> FloatArray:
     return law
 
 
+def _without_rounding(matrix: FloatArray) -> FloatArray:
+    """A symmetric matrix whose couplings are 0 where they are rounding. Shape (*batch, 3, 3)."""
+    size = np.sqrt(np.abs(np.diagonal(matrix, axis1=-2, axis2=-1)))
+    return np.where(np.abs(matrix) <= ROUNDING * size[..., :, None] * size[..., None, :], 0.0, matrix)
+
+
+def rims_of(plants: Plant) -> FloatArray:
+    """Speed of the rims of the wheels by the twist [m/s by m/s, m/s, rad/s]. Shape (*batch, wheels, 3)."""
+    rims = plants.element["g"][..., N_AXES:, :].copy()
+    rims[..., 2] *= plants.body["length"][..., None]
+    return rims
+
+
 def drives_of(plants: Plant) -> FloatArray:
     """P [N/V, N/V, N m/V]. Shape (*batch, 3, wheels)."""
     motors = plants.element[..., N_AXES:]
-    drive = np.swapaxes(motors["g"], -1, -2) * (motors["thrust"] / motors["resistance"])[..., None, :]
-    drive[..., 2, :] *= plants.body["length"][..., None]
-    return drive
+    return np.swapaxes(rims_of(plants), -1, -2) * (motors["thrust"] / motors["resistance"])[..., None, :]

@@ -19,11 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.simulation.coulomb.events import INSTANT, YAW_SHARE, astray, happens, leap
 from omnidyn.simulation.coulomb.law import BOX
 from omnidyn.simulation.coulomb.stage import RHO, SLIDES, solve_stage, speed_along, stage_derivatives
+from omnidyn.simulation.speed_loop import passed, tick_answer, tick_branch
 from omnidyn.simulation.way import PATH, PLACE, TURN
 
 GAMMA = 0.4358665215084590  # the root of x^3 - 3 x^2 + 3/2 x - 1/6 at which SDIRK3 is L-stable
@@ -107,6 +108,27 @@ def empty_seen(t: FloatArray, late: FloatArray, same: float, order: IntArray, tr
         np.full((*shape, travel), np.nan),
         np.full((*shape, len(order), 3), np.nan),
         np.full((*shape, len(order), travel), np.nan),
+    )
+
+
+def new_work(start: FloatArray, way: FloatArray, dstart: FloatArray) -> Work:
+    """Room for a run from a twist (3,) and a way (W,), with derivatives of the twist (3, K)."""
+    keys, travel = dstart.shape[1], len(way)
+    return Work(
+        np.array(start, dtype=float),
+        np.zeros((3, 3)),
+        np.zeros((3, 3)),
+        np.zeros((4, SLIDES)),
+        np.zeros((2, 3)),
+        np.stack([way, np.zeros(travel)]),
+        np.zeros(3),
+        np.zeros(9),
+        np.array(dstart, dtype=float),
+        np.zeros((3, 3, keys)),
+        np.zeros((3, 3, keys)),
+        np.zeros((2, 3, keys)),
+        np.zeros((2, travel, keys)),
+        np.zeros((3, keys)),
     )
 
 
@@ -375,7 +397,7 @@ def _look(seen, law, work, force, dforce, begin, h, share, euler, knows_rate):
             if after > h + seen.same:
                 break
             seen.next[c] += 1
-            if after < -seen.same:
+            if after < -seen.same:  # before the run
                 continue
             if after > h - seen.same:
                 _see_end(seen, work, c, r)
@@ -416,61 +438,140 @@ def _find(law, work, force, h, remaining, allowed, tol, most):
         h = max(SHORTEST_STEP, length * max(0.125, fitting) if ratio == ratio else 0.125 * length)
 
 
+@part
+def _row(seen, law, work, force, dforce, begin, dt, h, tol, limit):
+    """A row of held force that begins at `begin` [s], trying steps of h first. Returns (the next h, steps solved): more
+    than limit where it was given up."""
+    remaining, now, events, steps, knows = dt, begin, 0, 0, False
+    allowed = tol / law.memory
+    while remaining > 0.0 and steps <= limit:
+        most = tol * 2.0 ** max(0, (events - EVENTS_IN_A_ROW) // EVENTS_MORE)
+        length, h, event, count = _find(law, work, force, h, remaining, allowed, tol, most)
+        steps += count
+        share = length if event else GAMMA * length
+        if event:
+            events += 1
+            _euler(law, work, force, dforce, length)
+        else:
+            _derive(law, work, dforce, length)
+        _end_rate(work, share)
+        _move_on(work, length, event)
+        known = _look(seen, law, work, force, dforce, now, length, share, event, knows)
+        knows = known and not event
+        _copy(work.x, work.ends[2])
+        _copy(work.rate[0], work.rate[1])
+        _copy(work.way[0], work.way[1])
+        _copy_table(work.d, work.dends[2])
+        _copy_table(work.dway[0], work.dway[1])
+        if knows:
+            _copy_table(work.drate[0], work.drate[1])
+        remaining = remaining - length if length < remaining else 0.0
+        now += length
+    return h, steps
+
+
 @branching_kernel
-def run_rows(law, rows, start, way, dstart, step, tol, step_limit, seen):
-    """All rows of held force from a twist (3,) and a way (W,), with derivatives of the twist (3, K).
+def run_rows(law, rows, work, step, tol, step_limit, seen):
+    """All rows of held force from the start in `work`.
 
     step (1,): the step to begin with [s], which becomes the one to go on with. Returns the rows done: fewer where more
     than step_limit steps were solved.
     """
-    keys, travel = dstart.shape[1], seen.way.shape[2]
-    work = Work(
-        start.copy(),
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-        np.zeros((4, SLIDES)),
-        np.zeros((2, 3)),
-        np.zeros((2, travel)),
-        np.zeros(3),
-        np.zeros(9),
-        dstart.copy(),
-        np.zeros((3, 3, keys)),
-        np.zeros((3, 3, keys)),
-        np.zeros((2, 3, keys)),
-        np.zeros((2, travel, keys)),
-        np.zeros((3, keys)),
-    )
-    allowed = tol / law.memory
-    _copy(work.way[0], way)
-    begin, h, steps = 0.0, step[0], 0
+    begin, steps = 0.0, 0
     for r in range(len(rows.dt)):
-        force, dforce, remaining, events, knows = rows.force[r], rows.dforce[r], rows.dt[r], 0, False
-        now = begin
-        while remaining > 0.0:
-            most = tol * 2.0 ** max(0, (events - EVENTS_IN_A_ROW) // EVENTS_MORE)
-            length, h, event, count = _find(law, work, force, h, remaining, allowed, tol, most)
-            steps += count
-            share = length if event else GAMMA * length
-            if event:
-                events += 1
-                _euler(law, work, force, dforce, length)
-            else:
-                _derive(law, work, dforce, length)
-            _end_rate(work, share)
-            _move_on(work, length, event)
-            known = _look(seen, law, work, force, dforce, now, length, share, event, knows)
-            knows = known and not event
-            _copy(work.x, work.ends[2])
-            _copy(work.rate[0], work.rate[1])
-            _copy(work.way[0], work.way[1])
-            _copy_table(work.d, work.dends[2])
-            _copy_table(work.dway[0], work.dway[1])
-            if knows:
-                _copy_table(work.drate[0], work.drate[1])
-            remaining = remaining - length if length < remaining else 0.0
-            now += length
+        step[0], count = _row(
+            seen, law, work, rows.force[r], rows.dforce[r], begin, rows.dt[r], step[0], tol, step_limit - steps
+        )
         begin += rows.dt[r]
+        steps += count
         if steps > step_limit:
             return r
-    step[0] = h
     return len(rows.dt)
+
+
+class Loop(NamedTuple):
+    """The firmware's speed loop, and what it needs of a robot; see ../speed_loop.py. J rows.
+
+    d...: derivatives by K parameters, of numbers of the robot by the first R of them. ask and dask receive what the
+    loop asks for.
+    """
+
+    gains: FloatArray  # (4, n) kp [V s/rad], ki [V/rad], limit [V], radius [m]
+    dgains: FloatArray  # (R, 4, n)
+    wheel: FloatArray  # (n, 3) rim speeds of a twist
+    dwheel: FloatArray  # (R, n, 3)
+    drive: FloatArray  # (3, n) forces per volt
+    ddrive: FloatArray  # (R, 3, n)
+    command: FloatArray  # (J, n) [rad/s]
+    dcommand: FloatArray  # (K, J, n), or none
+    tick: BoolArray  # (J,) whether the loop runs at the start of the row; else its voltage stays
+    push: FloatArray  # (3,) wrench from outside
+    period: float  # [s]
+    dead: float  # [V] of what the loop asks for the driver passes on all but this
+    sum: FloatArray  # (n,) integral so far [V], in place
+    dsum: FloatArray  # (K, n)
+    ask: FloatArray  # (J, n) [V]
+    dask: FloatArray  # (K, J, n)
+
+
+@part
+def _tick(loop, x, d, j, volts, dvolts):
+    """One tick of all wheels, with derivatives, at the start of row j: what it asks for, and the integral in place."""
+    kp, ki, limit, radius, changed = loop.gains[0], loop.gains[1], loop.gains[2], loop.gains[3], len(loop.dgains)
+    for w in range(len(kp)):
+        g, total = loop.wheel[w], loop.sum[w]
+        speed = (g[0] * x[0] + g[1] * x[1] + g[2] * x[2]) / radius[w]
+        error = loop.command[j, w] - speed
+        takes, side = tick_branch(kp[w], ki[w], limit[w], loop.period, error, total)
+        volts[w], loop.sum[w] = tick_answer(kp[w], ki[w], limit[w], loop.period, error, total, takes, side)
+        for k in range(d.shape[1]):
+            derror = -(g[0] * d[0, k] + g[1] * d[1, k] + g[2] * d[2, k]) / radius[w]
+            if len(loop.dcommand):
+                derror += loop.dcommand[k, j, w]
+            dkp = dki = dlimit = 0.0
+            if k < changed:
+                dg, dgains = loop.dwheel[k, w], loop.dgains[k]
+                derror -= (dg[0] * x[0] + dg[1] * x[1] + dg[2] * x[2] - speed * dgains[3, w]) / radius[w]
+                dkp, dki, dlimit = dgains[0, w], dgains[1, w], dgains[2, w]
+            if takes:
+                loop.dsum[k, w] += (dki * error + ki[w] * derror) * loop.period
+            dvolts[k, w] = side * dlimit if side != 0.0 else dkp * error + kp[w] * derror + loop.dsum[k, w]
+
+
+@part
+def _force_of_loop(loop, j, force, dforce):
+    """The force of the voltages of row j behind the driver, and its derivatives (3, K)."""
+    for a in range(3):
+        force[a] = loop.push[a]
+        for k in range(dforce.shape[1]):
+            dforce[a, k] = 0.0
+    for w in range(loop.ask.shape[1]):
+        volts = passed(loop.ask[j, w], loop.dead)
+        flows = loop.dead == 0.0 or volts != 0.0
+        for a in range(3):
+            force[a] += loop.drive[a, w] * volts
+            for k in range(len(loop.ddrive)):
+                dforce[a, k] += loop.ddrive[k, a, w] * volts
+            for k in range(dforce.shape[1] if flows else 0):
+                dforce[a, k] += loop.drive[a, w] * loop.dask[k, j, w]
+
+
+@branching_kernel
+def run_loop(law, dt, loop, before, dbefore, work, step, tol, step_limit, seen):
+    """All rows behind the firmware's speed loop; before (n,), dbefore (K, n): what it asks for until its first tick. As
+    run_rows."""
+    begin, steps, force, dforce = 0.0, 0, np.zeros(3), np.zeros((3, work.d.shape[1]))
+    volts, dvolts = before.copy(), dbefore.copy()
+    for j in range(len(dt)):
+        if loop.tick[j]:
+            _tick(loop, work.x, work.d, j, volts, dvolts)
+        _copy(loop.ask[j], volts)
+        for k in range(len(dvolts)):
+            _copy(loop.dask[k, j], dvolts[k])
+        _force_of_loop(loop, j, force, dforce)
+        step[0], count = _row(seen, law, work, force, dforce, begin, dt[j], step[0], tol, step_limit - steps)
+        begin += dt[j]
+        steps += count
+        if steps > step_limit:
+            return j
+    return len(dt)

@@ -26,11 +26,13 @@ from omnidyn.model.stick_slip.release import start_state
 from omnidyn.model.stick_slip.step_bound import MONOTONE
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
-from omnidyn.simulation.commands import Commands, commands, current_bounds
-from omnidyn.simulation.coulomb.door import Moved, moved
+from omnidyn.simulation.commands import Commands, commands, current_bounds, loop_gains, on_ticks
+from omnidyn.simulation.contract import Motion
+from omnidyn.simulation.coulomb.door import Moved, moved, run_looped
 from omnidyn.simulation.coulomb.door import run as run_coulomb
 from omnidyn.simulation.engine import (
     TOLERANCE,
+    Coulomb,
     Implicit,
     as_start,
     as_tolerance,
@@ -51,9 +53,10 @@ from omnidyn.simulation.sensitivity.directions import (
     refuse_switched_off,
     width,
 )
-from omnidyn.simulation.sensitivity.march import LoopRun, march_with_derivatives, run_loop_with_derivatives
+from omnidyn.simulation.sensitivity.march import march_with_derivatives, run_loop_with_derivatives
 from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples, empty_samples
 from omnidyn.simulation.simulate import as_run
+from omnidyn.simulation.speed_loop import loop_of
 from omnidyn.simulation.view import seen_at_once
 from omnidyn.simulation.way import PATH, SAME_TIME, TURN
 
@@ -67,7 +70,7 @@ class Direction:
 
     up, down: robots at +EPS and -EPS, None where the robot stays. voltage, of the shape of the voltages [V], start (3,)
     and push (rows, 3): derivatives of them, of the twist at the start and of the wrench from outside, None where they
-    stay. name: for messages.
+    stay. name: for messages. plants: of up and down, where they are made already.
     """
 
     name: str
@@ -76,6 +79,12 @@ class Direction:
     voltage: FloatArray | None = None
     start: FloatArray | None = None
     push: FloatArray | None = None
+    plants: tuple[Plant, Plant] | None = None
+
+
+def direction_of(name: str, up: Robot, down: Robot) -> Direction:
+    """The way from one robot to another, for any number of runs."""
+    return Direction(name, up, down, plants=(plant(up), plant(down)))
 
 
 class VoltageProgram(NamedTuple):
@@ -242,6 +251,60 @@ def _coulomb_samples(
     return looks
 
 
+def _coulomb_looped(
+    robot: Robot,
+    moved_robot: Moved,
+    t: FloatArray,
+    set_point: FloatArray,
+    directions: Sequence[Direction],
+    late: Sequence[float],
+    tol: float,
+    travel: int,
+) -> list[LateSample]:
+    """`looped_samples` of a robot under Coulomb friction."""
+    held_commands = Commands(held(t, len(set_point), late), None, set_point=np.ascontiguousarray(set_point))
+    dt, command, tick, _ = on_ticks(robot, held_commands)
+    n, ends = robot.wheels.count, [end or robot for d in directions for end in (d.up, d.down)]
+    dgains = difference(np.array([loop_gains(end) for end in ends]).reshape(-1, 4, n))
+    run_of_loop = run_looped(
+        moved_robot,
+        np.array(loop_gains(robot)),
+        dgains,
+        loop_of(robot, command, tick),
+        np.zeros(n),
+        t,
+        dt,
+        np.zeros(3),
+        dt[:1].copy(),
+        tol,
+        np.asarray(late, dtype=float),
+        np.zeros(travel),
+    )
+    seen, looks = run_of_loop.seen, []
+    volts, dvolts = _passed_on(run_of_loop.ask, run_of_loop.dask, robot.drive.dead_band)
+    begins, voltage, rates = _in_force(volts, dvolts, np.concatenate([[0.0], np.cumsum(dt)]))
+    for c, delay in enumerate(seen.late):
+        rests = seen.t - delay < -SAME_TIME
+        for array in (seen.twist, seen.pace, seen.way, seen.dtwist, seen.dway):
+            array[c, rests] = 0.0
+        at = np.clip(np.searchsorted(begins, seen.t - delay + SAME_TIME, side="right") - 1, 0, len(voltage) - 1)
+        motion = (seen.twist[c], seen.pace[c], seen.way[c], voltage[at], seen.dtwist[c], seen.dway[c])
+        looks.append(
+            LateSample(
+                robot, tuple(directions), float(delay), *motion, np.moveaxis(rates[:, at], 0, 1), None, None, None
+            )
+        )
+    return looks
+
+
+def _passed_on(ask: FloatArray, dask: FloatArray, dead: float) -> tuple[FloatArray, FloatArray]:
+    """What a driver with a dead band [V] passes on of the voltages of a loop (J, n), and its derivatives (K, J, n)."""
+    if dead == 0.0:
+        return ask, dask
+    size = np.abs(ask) - dead
+    return np.sign(ask) * np.maximum(size, 0.0), dask * (size > 0.0)
+
+
 def _within(tol: float | None, numbers: Plant, dt: FloatArray) -> float:
     steep = float(np.median(dt)) * numbers.body.steep_sum > PIECES * MONOTONE
     return ROUGH_TOLERANCE if tol is None and steep else as_tolerance(tol)
@@ -263,6 +326,9 @@ def looped_samples(
     """
     refuse_rate([direction.name for direction in directions])
     numbers, plants = _plants(robot, directions)
+    moved_robot = None if tol is None else moved(numbers, plants, EPS)
+    if moved_robot is not None:
+        return _coulomb_looped(robot, moved_robot, t, set_point, directions, late, as_tolerance(tol), travel)
     robots = [moved_robot or robot for direction in directions for moved_robot in (direction.up, direction.down)]
     held_commands = Commands(held(t, len(set_point), late), None, set_point=np.ascontiguousarray(set_point))
     samples, count = _room(robot, t, late, len(directions), travel), len(directions)
@@ -282,7 +348,13 @@ def looped_samples(
         rests = samples.t - delay < -SAME_TIME
         for part in (samples.state, samples.pace, samples.way, samples.dstate, samples.dway):
             part[c, rests] = 0.0
-    return _looks(robot, directions, samples, (numbers.body.length, _stretch(plants)), _in_force(loop_run))
+    return _looks(
+        robot,
+        directions,
+        samples,
+        (numbers.body.length, _stretch(plants)),
+        _in_force(loop_run.voltage, loop_run.dvoltage, loop_run.edges),
+    )
 
 
 def held(t: FloatArray, commands: int, late: Sequence[float]) -> FloatArray:
@@ -295,13 +367,13 @@ def held(t: FloatArray, commands: int, late: Sequence[float]) -> FloatArray:
     return lengths if commands < len(t) else np.append(lengths, max(-min(late, default=0.0), lengths[-1]))
 
 
-def _in_force(loop_run: LoopRun) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _in_force(volts: FloatArray, dvolts: FloatArray, edges: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """[s] when each voltage of a loop comes into force, the voltages, derivatives: 0 before, unknown at the end."""
-    begins = np.concatenate([[-np.inf], loop_run.edges])
-    voltage = np.zeros((len(begins), loop_run.voltage.shape[1]))
-    voltage[1:-1], voltage[-1] = loop_run.voltage, np.nan
-    by = np.zeros((len(loop_run.dvoltage), *voltage.shape))
-    by[:, 1:-1] = loop_run.dvoltage
+    begins = np.concatenate([[-np.inf], edges])
+    voltage = np.zeros((len(begins), volts.shape[1]))
+    voltage[1:-1], voltage[-1] = volts, np.nan
+    by = np.zeros((len(dvolts), *voltage.shape))
+    by[:, 1:-1] = dvolts
     return begins, voltage, by
 
 
@@ -309,7 +381,12 @@ def _plants(robot: Robot, directions: Sequence[Direction]) -> tuple[Plant, list[
     """(the plant of the robot, those up and down each direction)."""
     refuse_band(robot)
     numbers = plant(robot)
-    plants = [numbers if r is None else plant(r) for direction in directions for r in (direction.up, direction.down)]
+    plants = [
+        end
+        for direction in directions
+        for end in direction.plants
+        or (numbers if robot is None else plant(robot) for robot in (direction.up, direction.down))
+    ]
     for k, direction in enumerate(directions):
         refuse_switched_off(direction.name, numbers, plants[2 * k])
     return numbers, plants
@@ -489,6 +566,10 @@ def differentiate(
     robot, keys, robots, numbers, plants = ready.robot, ready.keys, ready.robots, ready.numbers, ready.plants
     if held_commands.set_point is not None:
         refuse_rate(keys)
+    coasts = held_commands.open_circuit is not None
+    moved_robot = None if coasts or not tol else moved(numbers, plants, EPS)
+    if moved_robot is not None:
+        return _differentiate_coulomb(ready, moved_robot, held_commands, rates, start, tol)
     directions, length = directions_of(numbers, plants, rates), numbers.body.length
     stretch = difference(np.array([p.body.length for p in plants]))
     first = np.zeros((len(keys), width(numbers)))
@@ -517,6 +598,67 @@ def differentiate(
     dcurrent = dcurrent * (np.append(bound, bound[-1:], axis=0)[:, None] > 0.0)  # none while a motor coasts
     parts = (np.moveaxis(part, 1, 2) / ready.scale for part in (dtwist, dposes, dcurrent))
     return Derivatives(run, keys, *parts)
+
+
+def _differentiate_coulomb(
+    ready: Prepared,
+    moved_robot: Moved,
+    held_commands: Commands,
+    rates: FloatArray,
+    start: tuple[FloatArray, FloatArray],
+    tol: float,
+) -> Derivatives:
+    """`differentiate` of a robot under Coulomb friction."""
+    robot, (twist, pose) = ready.robot, start
+    edges = np.concatenate([[0.0], np.cumsum(held_commands.dt)])
+    way, late = np.array([pose[2], 0.0, 0.0, pose[0], pose[1]]), np.zeros(1)
+    if held_commands.set_point is None:
+        assert held_commands.voltage is not None
+        voltage, dvolts, dt = held_commands.voltage, rates, held_commands.dt
+        seen = run_coulomb(
+            moved_robot,
+            edges,
+            dt,
+            voltage,
+            twist,
+            dt[:1].copy(),
+            tol,
+            late,
+            way,
+            None,
+            [{"voltage": rate} for rate in rates],
+            range(len(rates)),
+        )
+    else:
+        dt, command, tick, keep = on_ticks(robot, held_commands)
+        n = robot.wheels.count
+        dgains = difference(np.array([loop_gains(end) for end in ready.robots]).reshape(-1, 4, n))
+        run_of_loop = run_looped(
+            moved_robot,
+            np.array(loop_gains(robot)),
+            dgains,
+            loop_of(robot, command, tick),
+            np.zeros(n),
+            edges,
+            dt,
+            twist,
+            dt[:1].copy(),
+            tol,
+            late,
+            way,
+            None,
+            np.repeat(rates, np.diff(keep), axis=1),
+        )
+        seen, rows = run_of_loop.seen, keep[:-1]
+        volts, dvolts = _passed_on(run_of_loop.ask, run_of_loop.dask, robot.drive.dead_band)
+        voltage, dvolts = volts[rows], dvolts[:, rows]
+    twists, poses = seen.twist[0], seen.way[0][:, [PATH, PATH + 1, 0]]
+    twists[0], poses[0] = twist, pose
+    motion = Motion(None, twists, poses, voltage)
+    run = as_run(robot, held_commands, held_commands, motion, named(Coulomb.kind, tol), ())
+    dtwist, dpose = seen.dtwist[0], seen.dway[0][..., [PATH, PATH + 1, 0]]
+    parts = (dtwist, dpose, _settled(ready.robots, run, dtwist, dvolts))
+    return Derivatives(run, ready.keys, *(np.moveaxis(part, 1, 2) / ready.scale for part in parts))
 
 
 def refuse_rate(keys: Sequence[str]) -> None:

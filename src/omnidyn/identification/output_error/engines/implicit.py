@@ -29,7 +29,13 @@ from omnidyn.model.known.told import holding
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.sensitivity.directions import EPS, difference
-from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, VoltageProgram, late_samples
+from omnidyn.simulation.sensitivity.late_sample import (
+    Direction,
+    LateSample,
+    VoltageProgram,
+    direction_of,
+    late_samples,
+)
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
 from omnidyn.simulation.way import PATH, PLACE, TURN
 from omnidyn.statistics import difference_noise
@@ -152,19 +158,22 @@ class ImplicitEngine(Engine[Problem]):
     def _simulated(self, point: Point) -> list[Parts]:
         robot, values = holding(self.problem.robot_at(point.values), self.levels), point.values
         scales = [abs(float(value)) or 1.0 for value in values]
-        moved_robots = [
-            tuple(holding(p.on(robot, float(value) + side * EPS * scale), self.levels) for side in (1.0, -1.0))
+        moved = [
+            direction_of(
+                p.name,
+                *(holding(p.on(robot, float(value) + side * EPS * scale), self.levels) for side in (1.0, -1.0)),
+            )
             for p, value, scale in zip(self.problem.robot_parameters, values, scales, strict=False)
         ]
         return side_by_side(
-            lambda piece_job: self._piece(robot, moved_robots, scales, piece_job[0], piece_job[1], values),
+            lambda piece_job: self._piece(robot, moved, scales, piece_job[0], piece_job[1], values),
             zip(self.problem.pieces, point.states, strict=True),
         )
 
     def _piece(
         self,
         robot: Robot,
-        moved_robots: list[tuple[Robot, ...]],
+        moved: list[Direction],
         scales: list[float],
         piece: Piece,
         state: FloatArray,
@@ -175,7 +184,7 @@ class ImplicitEngine(Engine[Problem]):
         t, measured = record.t[piece.first : piece.last + 1], record.outputs[piece.first : piece.last + 1].T
         latencies, latency_indices = late_by(self.problem, values, record.columns)
         distinct = sorted(set(latencies))
-        samples, slope_indices, factors = self._run(robot, moved_robots, scales, piece, state, values, distinct)
+        samples, slope_indices, factors = self._run(robot, moved, scales, piece, state, values, distinct)
         residual = np.empty(measured.shape)
         keys = len(slope_indices)
         offsets = count + N_AXES + np.flatnonzero(piece.free[N_AXES:])
@@ -211,7 +220,7 @@ class ImplicitEngine(Engine[Problem]):
     def _run(
         self,
         robot: Robot,
-        moved_robots: list[tuple[Robot, ...]],
+        moved: list[Direction],
         scales: list[float],
         piece: Piece,
         state: FloatArray,
@@ -220,8 +229,8 @@ class ImplicitEngine(Engine[Problem]):
     ) -> tuple[list[LateSample], list[int], FloatArray]:
         """(a look at the run for every latency, index of each direction among the slopes, their factors)."""
         t = piece.record.t[piece.first : piece.last + 1]
-        voltage, directions, slope_indices, factors = self._directions(robot, moved_robots, scales, piece, values)
-        push, force_directions, force_indices = self._forces(robot, moved_robots, piece, values, directions)
+        voltage, directions, slope_indices, factors = self._directions(robot, moved, scales, piece, values)
+        push, force_directions, force_indices = self._forces(robot, moved, piece, values, directions)
         program, travel = VoltageProgram(t, voltage, state[:N_AXES], push), travel_of(piece.record.columns)
         factors = np.concatenate([factors, np.ones(len(force_indices))])
         return (
@@ -233,7 +242,7 @@ class ImplicitEngine(Engine[Problem]):
     def _forces(
         self,
         robot: Robot,
-        moved_robots: list[tuple[Robot, ...]],
+        moved: list[Direction],
         piece: Piece,
         values: FloatArray,
         directions: Sequence[Direction],
@@ -250,7 +259,8 @@ class ImplicitEngine(Engine[Problem]):
         def wrench(moved_robot: Robot, force: FloatArray) -> FloatArray:
             return in_the_body(heading_at, force[:2], moved_robot.body.centre) + force[2:]
 
-        for k, (upper, lower) in enumerate(moved_robots):
+        for k, direction in enumerate(moved):
+            upper, lower = direction.up or robot, direction.down or robot
             if upper.body.centre != lower.body.centre:
                 new_directions[k] = replace(
                     new_directions[k], push=difference(np.array([wrench(upper, force), wrench(lower, force)]))[0]
@@ -291,7 +301,7 @@ class ImplicitEngine(Engine[Problem]):
         return channels[name]()
 
     def _directions(
-        self, robot: Robot, moved_robots: list[tuple[Robot, ...]], scales: list[float], piece: Piece, values: FloatArray
+        self, robot: Robot, moved: list[Direction], scales: list[float], piece: Piece, values: FloatArray
     ) -> tuple[FloatArray, list[Direction], list[int], FloatArray]:
         """(voltages at the motors, directions, index of each among the slopes, what turns its derivative into that)."""
         record, count = piece.record, len(self.problem.parameters)
@@ -300,12 +310,12 @@ class ImplicitEngine(Engine[Problem]):
         logged = clip_voltage(robot.motor, through_the_end(record.voltage[rows]))
         share = record.share[rows]
         voltage, voltage_slopes = at_motors(logged, share, driver)
-        for p, (upper, lower) in zip(self.problem.robot_parameters, moved_robots, strict=True):
-            rate = None
+        for direction in moved:
+            rate, upper, lower = None, direction.up or robot, direction.down or robot
             if upper.motor.voltage_limit != lower.motor.voltage_limit:
                 ends = [at_motors(clip_voltage(r.motor, logged), share, driver)[0] for r in (upper, lower)]
                 rate = difference(np.array(ends))[0]
-            directions.append(Direction(p.name, upper, lower, rate))
+            directions.append(replace(direction, voltage=rate))
         for name, k, rate in zip(Driver._fields, driver_indices, voltage_slopes, strict=True):
             if k >= 0:
                 directions.append(Direction(name, voltage=rate))

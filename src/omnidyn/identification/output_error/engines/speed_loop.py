@@ -65,19 +65,19 @@ class LoopEngine(ImplicitEngine):
     def _piece(
         self,
         robot: Robot,
-        moved_robots: list[tuple[Robot, ...]],
+        moved: list[Direction],
         scales: list[float],
         piece: Piece,
         state: FloatArray,
         values: FloatArray,
     ) -> Parts:
-        residual, slopes, indices = super()._piece(robot, moved_robots, scales, piece, state, values)
+        residual, slopes, indices = super()._piece(robot, moved, scales, piece, state, values)
         return residual, np.clip(np.nan_to_num(slopes), -SLOPE_LIMIT, SLOPE_LIMIT), indices
 
     def _run(
         self,
         robot: Robot,
-        moved_robots: list[tuple[Robot, ...]],
+        moved: list[Direction],
         scales: list[float],
         piece: Piece,
         state: FloatArray,
@@ -86,10 +86,6 @@ class LoopEngine(ImplicitEngine):
     ) -> tuple[list[LateSample], list[int], FloatArray]:
         """As of any run; where currents jump from tick to tick, a look a period after theirs is the last one."""
         count, (t, set_point) = self.problem.robot_count, _driven(piece)
-        directions = [
-            Direction(p.name, upper, lower)
-            for p, (upper, lower) in zip(self.problem.robot_parameters, moved_robots, strict=True)
-        ]
         current_index = self.problem.where(f"{LATENCY_PREFIX}current")
         earlier_times = (
             [float(values[current_index]) - self._period] if current_index >= 0 and self._jumps(piece) else []
@@ -98,7 +94,7 @@ class LoopEngine(ImplicitEngine):
             robot,
             t,
             set_point,
-            directions,
+            moved,
             [*latencies, *earlier_times],
             self.tol,
             travel_of(piece.record.columns),

@@ -21,6 +21,7 @@ from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import NEAR_PRECISION, Solution, Solver, State
 from omnidyn.model.keys import FRICTION, find_key
 from omnidyn.model.robot import Robot
+from omnidyn.simulation.sensitivity.late_sample import Direction
 
 CURRENTS, MOTOR = f"{LATENCY}.current", "motor"
 MANY_ROWS = 100_000  # rows to which a long log is first fitted
@@ -137,13 +138,13 @@ class RateEngine(ImplicitEngine):
     def _piece(
         self,
         robot: Robot,
-        moved_robots: list[tuple[Robot, ...]],
+        moved: list[Direction],
         scales: list[float],
         piece: Piece,
         state: FloatArray,
         values: FloatArray,
     ) -> Parts:
-        residual, slopes, indices = super()._piece(robot, moved_robots, scales, piece, state, values)
+        residual, slopes, indices = super()._piece(robot, moved, scales, piece, state, values)
         for c, (name, _) in enumerate(piece.record.columns):
             if name in TRAVELS:
                 known_rows = np.flatnonzero(np.isfinite(residual[c]))
