@@ -26,6 +26,8 @@ END_PRECISION = 1e-5  # squared distance to the best point, in standard errors, 
 KINK_PRECISION = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
 NEAR_PRECISION = 10.0  # the same from where a descent goes on by another likelihood, or by shorter steps
 LEAST_STEP = 0.3  # share of a step that is too long: what is less long goes another way
+# What F rises by at most, times the squared distance, where half of a step may do; damping that holds what rounding made
+MOST_RISE, MOST_NEAR_DAMPING = 16.0, 1e-7
 SCATTER = 1e-2  # of F by an engine that marches by steps: a difference below it says nothing, but a gradient does
 CREEP, STEPS = 3.0, 2  # times `close`, that so many steps in a row each lower F by less than: they creep along a kink
 BEND_DISTANCE = (
@@ -104,7 +106,7 @@ class Solver(Generic[P]):
     ):
         self.problem, self.engine, self.nu, self.close, self.counted = problem, engine, nu, precision, counts_ticks
         is_exact = precision <= END_PRECISION  # or a speed loop, which may creep for long, and yet find its way
-        self.creep, self._scatter = (0.0, 0.0) if is_exact else (CREEP * precision, SCATTER)
+        self.creep, self._scatter = (0.0, 0.0) if is_exact else (max(CREEP * precision, 2.0 * SCATTER), SCATTER)
         self._kink = max(KINK_PRECISION, precision, 2.0 * self._scatter)  # F would change by less than it scatters
         self.tick = problem.tick if counts_ticks else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
@@ -171,7 +173,7 @@ class Solver(Generic[P]):
             held_parameters if blocked_parameters is None else blocked_parameters,
             Bend(len(held_parameters)),
         )
-        is_released, slow_steps, share = False, 0, 1.0
+        is_released, slow_steps, share, near_damping = False, 0, 1.0, 0.0
         for iteration in range(limit):
             normal, objective_before = Normal(self, state), state.objective
             held_parameters, is_better, is_halved = normal.held, False, False
@@ -180,7 +182,7 @@ class Solver(Generic[P]):
             still_parameters, shift = held_parameters | blocked_parameters, np.zeros(len(held_parameters))
             is_near = normal.distance_without(still_parameters) < BEND_DISTANCE
             if self._scatter and self.engine.tol and damping < FIRM_DAMPING and is_near:
-                damping = 0.0  # what numbers go together by is known by priors alone: any would hold it
+                damping = near_damping  # what numbers go together by is known by priors alone: much would hold it
             while not is_better and (distance := normal.distance_without(still_parameters)) / (1.0 + damping) > (
                 self.close if damping < FIRM_DAMPING else self._kink
             ):
@@ -193,9 +195,15 @@ class Solver(Generic[P]):
                 is_better = trial.objective < state.objective or self._is_nearer(
                     trial, state, distance, still_parameters
                 )
-                if not is_better and damping == 0.0 and share > LEAST_STEP and share * distance > self._kink:
-                    share, is_halved = 0.5 * share, True  # a valley: shorter, but the same way
-                    continue
+                rise = trial.objective - state.objective
+                if not is_better and damping == near_damping and share * distance > self._kink:
+                    if share > LEAST_STEP and rise < MOST_RISE * distance:  # a valley: shorter, but the same way
+                        share, is_halved = 0.5 * share, True
+                        continue
+                    if near_damping < MOST_NEAR_DAMPING and not rise < MOST_RISE * distance:  # a way that rounding made
+                        near_damping = damping = max(100.0 * near_damping, LEAST_DAMPING)
+                        share = 1.0
+                        continue
                 edge = None if is_better else self._edges.not_yet(still_parameters)
                 if edge is not None:  # once more, and from here on, without what may stand at a jump or a kink
                     shift = self._edges.onto(normal.inner, self.inner(moved_point.values), still_parameters | ~edge)
