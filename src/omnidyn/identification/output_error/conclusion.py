@@ -91,10 +91,7 @@ def conclude(
     none_told = latencies_like_zero(problem, values, uncertainty)
     on_time = np.where([p.name in none_told for p in problem.parameters], 0.0, values)
     robot = with_nuisances(robot, problem, on_time, std, open_names, records, data)
-    late_notes = [
-        Statement("latency_like_zero", NOTE, name, {"latency": float(values[problem.where(name)]), "std": std[name]})
-        for name in none_told
-    ]
+    late_notes = [Statement("latency_like_zero", NOTE, numbers={"latencies": none_told})] if none_told else []
     return OutputErrorEstimate(
         robot=_together(robot, problem.parameters, std, uncertainty, correlation.matrix),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}

@@ -38,7 +38,14 @@ from omnidyn.identification.output_error.solve.first_point import coarse_point, 
 from omnidyn.identification.output_error.solve.loop import FINE_TOLERANCE as LOOP_FINE
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Best, FitProgress
-from omnidyn.identification.output_error.solve.solver import MAX_ITERATIONS, NEAR_PRECISION, Normal, Solution, Solver
+from omnidyn.identification.output_error.solve.solver import (
+    END_PRECISION,
+    MAX_ITERATIONS,
+    NEAR_PRECISION,
+    Normal,
+    Solution,
+    Solver,
+)
 from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_levels, find_breakaway
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import beside, differences, refuse_bootstrap, resampled
@@ -467,7 +474,8 @@ class Fit:
             kind = self.groups[0].engine
             return Solver(problems[0], kind.of(problems[0], LOOP_FINE if kind.has_loop else tol), self.nu)
         engine = join(self.groups, problems, own_names(self.question.per_free, problems), tol)
-        return Solver(engine.problem, engine, self.nu)
+        by_steps = not any(group.engine.exact or group.engine.has_loop for group in self.groups)
+        return Solver(engine.problem, engine, self.nu, FIT_PRECISION if by_steps else END_PRECISION)
 
     def _so_far(self, best: Best) -> tuple[Solution, list[Statement]]:
         """The best so far as if it were the best, and what is to be said of it."""

@@ -26,8 +26,8 @@ END_PRECISION = 1e-5  # squared distance to the best point, in standard errors, 
 KINK_PRECISION = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
 NEAR_PRECISION = 10.0  # the same from where a descent goes on by another likelihood, or by shorter steps
 LEAST_STEP = 0.3  # share of a step that is too long: what is less long goes another way
-# What F rises by at most, times the squared distance, where half of a step may do; damping that holds what rounding made
-MOST_RISE, MOST_NEAR_DAMPING = 16.0, 1e-7
+MOST_RISE = 16.0  # times the squared distance, that F rises by where half of a step may do
+MOST_NEAR_DAMPING = 1e-7  # that holds what rounding made of a step
 SCATTER = 1e-2  # of F by an engine that marches by steps: a difference below it says nothing, but a gradient does
 CREEP, STEPS = 3.0, 2  # times `close`, that so many steps in a row each lower F by less than: they creep along a kink
 BEND_DISTANCE = (
