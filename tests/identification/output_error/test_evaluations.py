@@ -1,4 +1,4 @@
-"""How many simulations a whole fit takes, from what `init` guesses: logs of a simulator that shares no code with ours."""
+"""How many simulations a whole fit takes, from what `init` guesses: logs of a simulator of its own."""
 
 import numpy as np
 import pytest

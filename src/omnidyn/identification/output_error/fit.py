@@ -19,7 +19,14 @@ from omnidyn.identification.grouping import count_once
 from omnidyn.identification.methods import AUTO, OutputError, degrees
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import ALL_LOGS, begun, group_names
-from omnidyn.identification.output_error.choice import FORCE_ERRORS, beside_given, best_with_force, better_of, why_white
+from omnidyn.identification.output_error.choice import (
+    SCREENING_STEPS,
+    beside_given,
+    best_with_force,
+    better_of,
+    screened,
+    why_white,
+)
 from omnidyn.identification.output_error.conclusion import conclude, loss_words, unexplained
 from omnidyn.identification.output_error.joint import join, joint_start, own_names
 from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
@@ -34,14 +41,14 @@ from omnidyn.identification.output_error.problem.friction_laws import band_note,
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, TRAVELS, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated
 from omnidyn.identification.output_error.problem.problem import Problem
-from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point, point_of
+from omnidyn.identification.output_error.solve.by_steps import FIT_PRECISION, solve_by_steps
+from omnidyn.identification.output_error.solve.first_point import first_point
 from omnidyn.identification.output_error.solve.loop import FINE_TOLERANCE as LOOP_FINE
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Best, FitProgress
 from omnidyn.identification.output_error.solve.solver import (
     END_PRECISION,
     MAX_ITERATIONS,
-    NEAR_PRECISION,
     Normal,
     Solution,
     Solver,
@@ -57,16 +64,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.progress import silent
 from omnidyn.run import Run, as_list
 from omnidyn.statement import WARNING, Statement
-
-HALFWAY_TOLERANCE = 3e-4  # [m/s] tolerance of the implicit engine on the way there
-FIT_PRECISION = (
-    2.5e-3  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
-)
-
-
-SCREENING_STEPS = 3  # of a fit with a constant force, before it is known whether it pays
-FORCE_GAIN = 0.5 * FORCE_ERRORS**2  # of the likelihood, below which a constant force is none
-FORCE_SHARE = 0.5  # of what the better one gains: a constant force that gains less predicts no better
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,25 +333,13 @@ class Fit:
             return chosen_solution
         inner_progress = progress.aside("once more with a constant force")
         try:
-            forced_solutions = self._forced(chosen_solution, inner_progress)
+            names = chosen_solution.solver.problem.nuisances
+            begun_fits = [
+                self.beside(chosen_solution, [*names, force], inner_progress, SCREENING_STEPS) for force in (PUSH, TILT)
+            ]
         except UnsupportedError:  # an engine that knows no constant force
             return chosen_solution
-        return best_with_force(chosen_solution, forced_solutions) if forced_solutions else chosen_solution
-
-    def _forced(self, chosen_solution: Solution, progress: FitProgress) -> list[Solution]:
-        """The fits with a constant force in the body, and in the room, that may be taken: a few steps screen them.
-
-        Raises UnsupportedError for an engine that knows no constant force.
-        """
-        names, objective = chosen_solution.solver.problem.nuisances, chosen_solution.state.objective
-        begun_fits = [
-            self.beside(chosen_solution, [*names, force], progress, SCREENING_STEPS) for force in (PUSH, TILT)
-        ]
-        gains = [objective - begun_fit.least_objective for begun_fit in begun_fits]
-        least_gain = max(FORCE_GAIN, FORCE_SHARE * max(gains))
-        return [
-            begun_fit.gone_on(progress) for begun_fit, gain in zip(begun_fits, gains, strict=True) if gain >= least_gain
-        ]
+        return best_with_force(chosen_solution, screened(chosen_solution, begun_fits, inner_progress))
 
     def _plain(self, solution: Solution, progress: FitProgress) -> Solution:
         """The fit of the only group without nuisances, but for the gain of a nominal supply; the fit itself where it
@@ -404,26 +389,11 @@ class Fit:
         that marches by steps begins, and takes at most `limit` steps."""
         if group.engine.has_loop:
             return solve_loop(problem, self.nu, progress)
-        engine = group.engine.of(problem, FINE_TOLERANCE)
-        if group.engine.exact:
-            progress.enter("looking for a start")
-            solver = Solver(problem, engine, self.nu)
-            return solver.minimise(first_point(solver, group.records), progress=progress)
-        solver = Solver(problem, engine, self.nu, FIT_PRECISION)
-        if base_solution is not None:
-            scales = base_solution.state.variance if self.nu else None
-            return solver.minimise(point_of(base_solution, problem), limit, progress, scales=scales)
-        coarse_state = coarse_point(problem, self.nu, progress)
-        halfway_engine = group.engine.of(problem, HALFWAY_TOLERANCE)
-        nearer_solution = Solver(problem, halfway_engine, self.nu, NEAR_PRECISION, counts_ticks=False).minimise(
-            coarse_state.point, progress=progress, scales=coarse_state.variance if self.nu else None
-        )
-        return solver.minimise(
-            nearer_solution.state.point,
-            progress=progress,
-            blocked_parameters=nearer_solution.blocked_parameters,
-            scales=nearer_solution.state.variance if self.nu else None,
-        )
+        if not group.engine.exact:
+            return solve_by_steps(problem, group.engine, self.nu, progress, base_solution, limit)
+        progress.enter("looking for a start")
+        solver = Solver(problem, group.engine.of(problem, FINE_TOLERANCE), self.nu)
+        return solver.minimise(first_point(solver, group.records), progress=progress)
 
     def _settled_alone(self, progress: FitProgress) -> tuple[str, ...] | None:
         """The automatic nuisances that every group supports alone; None where they are not automatic, or all stay."""

@@ -17,6 +17,13 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.engine import Engine, P, Weighting
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
 from omnidyn.identification.output_error.problem.problem import Fitted, PieceSums, Point, per_column
+from omnidyn.identification.output_error.solve.normal_equations import (
+    SPEED_LIMITS,
+    damped,
+    of_states,
+    solve_balanced,
+    weighted,
+)
 from omnidyn.identification.output_error.solve.steps import Bend, Edges, Order
 from omnidyn.progress import Progress, Report
 from omnidyn.statement import Statement
@@ -39,11 +46,7 @@ FIRM_DAMPING, SHORT_DAMPING = (
     10.0,
 )  # least damping after a step that failed; that of a step with what was blocked at an edge
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
-NO_INFORMATION = 1e-100  # information on the start of a piece that is none: divided by it, nothing is finite
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
-
-
-SPEED_LIMITS = np.array([30.0, 30.0, 300.0])  # [m/s, m/s, rad/s] no robot sets off faster; a step astray would not end
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,14 +198,13 @@ class Solver(Generic[P]):
                 is_better = trial.objective < state.objective or self._is_nearer(
                     trial, state, distance, still_parameters
                 )
-                rise = trial.objective - state.objective
                 if not is_better and damping == near_damping and share * distance > self._kink:
-                    if share > LEAST_STEP and rise < MOST_RISE * distance:  # a valley: shorter, but the same way
-                        share, is_halved = 0.5 * share, True
+                    is_wild = trial.objective - state.objective >= MOST_RISE * distance  # a way that rounding made
+                    if is_wild and damping < MOST_NEAR_DAMPING:
+                        damping = near_damping = min(max(100.0 * damping, LEAST_DAMPING), MOST_NEAR_DAMPING)
                         continue
-                    if near_damping < MOST_NEAR_DAMPING and not rise < MOST_RISE * distance:  # a way that rounding made
-                        near_damping = damping = max(100.0 * near_damping, LEAST_DAMPING)
-                        share = 1.0
+                    if share > LEAST_STEP:  # a valley: shorter, but the same way
+                        share, is_halved = 0.5 * share, True
                         continue
                 edge = None if is_better else self._edges.not_yet(still_parameters)
                 if edge is not None:  # once more, and from here on, without what may stand at a jump or a kink
@@ -314,7 +316,7 @@ class Normal:
         self.solver, self.state, count = solver, state, len(problem.parameters)
         self.scale = np.array([p.slope(float(v)) for p, v in zip(problem.parameters, state.point.values, strict=True)])
         self.pieces = [
-            _weighted(sums, 1.0 / state.variance[sums.columns], self.scale, states, piece.start_prior(states))
+            weighted(sums, 1.0 / state.variance[sums.columns], self.scale, states, piece.start_prior(states))
             for sums, states, piece in zip(state.sums, state.point.states, problem.pieces, strict=True)
         ]
         self._count = count
@@ -336,7 +338,7 @@ class Normal:
         gradient, information = self.prior_gradient.copy(), np.diag(self.prior_information)
         for grad, info in self.pieces:
             k = self._count
-            damped_information = _damped(info, damping)
+            damped_information = damped(info, damping)
             gradient += grad[:k]
             information = information + damped_information[:k, :k]
             if grad.shape[0] > k:
@@ -350,7 +352,7 @@ class Normal:
         `still_parameters`."""
         free, fold = ~still_parameters, self.solver.order.together(self.inner, still_parameters)
         gradient = fold.T @ self.gradient
-        step = _solve((fold.T @ self.information @ fold)[np.ix_(free, free)], gradient[free])
+        step = solve_balanced((fold.T @ self.information @ fold)[np.ix_(free, free)], gradient[free])
         total = float(step @ gradient[free])
         for grad, info in self.pieces:  # what the states alone would gain
             if grad.shape[0] > self._count:
@@ -381,76 +383,18 @@ class Normal:
         free, fold = ~still_parameters, self.solver.order.together(self.inner, still_parameters)
         gradient, information = fold.T @ gradient, fold.T @ (information + bend) @ fold
         step = np.where(still_parameters, onto, 0.0)
-        step[free] = _solve(information[np.ix_(free, free)], (gradient - information @ step)[free])
+        step[free] = solve_balanced(information[np.ix_(free, free)], (gradient - information @ step)[free])
         inner_values = self.solver.clipped(self.inner + self.solver.engine.bent(self.inner, share * (fold @ step)))
         step = inner_values - self.inner
         k, states = self._count, []
         for (grad, info), old in zip(self.pieces, self.state.point.states, strict=True):
             new = old.copy()
             if grad.shape[0] > k:
-                damped_information = _damped(info, damping)
+                damped_information = damped(info, damping)
                 new += of_states(damped_information[k:, k:], share * grad[k:] - damped_information[k:, :k] @ step)
                 new[: len(SPEED_LIMITS)] = np.clip(new[: len(SPEED_LIMITS)], -SPEED_LIMITS, SPEED_LIMITS)
             states.append(new)
         return Point(self.solver.outer(inner_values), tuple(states))
-
-
-def of_states(information: FloatArray, right: FloatArray) -> FloatArray:
-    """information^-1 right for the start of a piece; a state that no row tells of stays where it is.
-
-    Such is the speed of a motor that sticks from the start, or whose outputs are missing until it has stopped.
-    """
-    try:
-        return np.asarray(np.linalg.solve(information, right), dtype=float)
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.pinv(information, hermitian=True) @ right, dtype=float)
-
-
-def _weighted(
-    sums: PieceSums,
-    weight: FloatArray,
-    scale: FloatArray,
-    states: FloatArray,
-    start_prior: tuple[FloatArray, FloatArray],
-) -> tuple[FloatArray, FloatArray]:
-    """Gradient and information of a piece over its columns, in inner numbers. start_prior: of its start, see
-    `start_prior`.
-
-    States that are not free do not move. Nor does a speed that the rows only know to be below the fastest (a robot may
-    forget its start before the first row that is used), or that they would pull beyond it.
-    """
-    count = len(scale)
-    full = np.concatenate([scale, np.ones(sums.grad.shape[1] - count)])
-    grad = (weight @ sums.grad) * full
-    info = np.tensordot(weight, sums.info, 1) * np.outer(full, full)
-    start = np.arange(count, count + len(start_prior[0]))
-    grad[start] += start_prior[0]
-    info[start, start] += start_prior[1]
-    state_information = info.diagonal()[count:]
-    if not state_information.max(initial=0.0) > NO_INFORMATION:
-        return grad[:count], info[:count, :count]
-    unseen_states = state_information <= NO_INFORMATION
-    unseen_states[: len(SPEED_LIMITS)] |= state_information[: len(SPEED_LIMITS)] < SPEED_LIMITS**-2
-    speeds, pull = states[: len(SPEED_LIMITS)], grad[count : count + len(SPEED_LIMITS)]
-    unseen_states[: len(SPEED_LIMITS)] |= (np.abs(speeds) >= SPEED_LIMITS) & (np.sign(speeds) * pull > 0.0)
-    state_indices = np.flatnonzero(unseen_states) + count
-    grad[state_indices], info[state_indices, :], info[:, state_indices] = 0.0, 0.0, 0.0
-    info[state_indices, state_indices] = 1.0
-    return grad, info
-
-
-def _damped(info: FloatArray, damping: float) -> FloatArray:
-    return info + np.diag(damping * info.diagonal()) if damping else info
-
-
-def _solve(information: FloatArray, gradient: FloatArray) -> FloatArray:
-    """information^-1 gradient in balanced units; directions that the data do not see stay where they are."""
-    size = np.sqrt(np.maximum(information.diagonal(), 0.0))
-    size[size == 0.0] = 1.0
-    values, vectors = np.linalg.eigh(information / np.outer(size, size))
-    seen_values = values > 1e-13 * max(float(values.max(initial=0.0)), 1e-300)
-    inverse = np.where(seen_values, 1.0 / np.where(seen_values, values, 1.0), 0.0)
-    return (vectors @ (inverse * (vectors.T @ (gradient / size)))) / size
 
 
 def _floor(problem: Fitted) -> FloatArray:
