@@ -84,8 +84,7 @@ def shared_out(robot: Robot) -> AbstractContextManager[None]:
 
 
 def needed_late() -> None:
-    """What a fit by steps needs beside its march: the kernels that add up rows, called as the fit calls them, on next to
-    nothing."""
+    """What a fit by steps needs beside its march: the kernels that add up rows, called as the fit calls them."""
     row_terms(np.zeros((1, 2)), np.ones(1), 0.0, None, np.ones(1), False)
     row_squares(np.zeros((1, 2, 1)), np.zeros((1, 2)))
     _remember()
