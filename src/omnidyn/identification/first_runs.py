@@ -18,6 +18,7 @@ from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.engine import row_squares, row_terms
 from omnidyn.identification.output_error.memory.autoregression import autoregression
 from omnidyn.model.dynamics import acceleration
+from omnidyn.model.friction import WheelFriction
 from omnidyn.model.motor import DYNAMIC, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
@@ -42,6 +43,8 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
     axes = paper.friction.axes
     falls = axes.replace(breakaway=tuple(2.0 * level for level in axes.coulomb), stribeck_speed=(0.05, 0.05, 0.5))
     falling_robot = paper.replace(friction=paper.friction.replace(axes=falls))
+    held = mecanum.replace(friction=mecanum.friction.replace(wheels=WheelFriction(coulomb=1.0)))
+    held_loop = loop_robot.replace(friction=held.friction)
     winding = four.replace(motor=four.motor.replace(electrical=DYNAMIC, inductance=1e-3))
     return [
         ("simulation, friction of the axes", partial(_run, paper)),
@@ -52,11 +55,13 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("fit of speeds, currents and poses", partial(_fit, paper, "twist", "current", "pose")),
         ("fit of a force in the room", partial(_fit, paper, "twist", "current", "pose", nuisances=("tilt",))),
         ("fit of counted angles", partial(_fit, paper, "wheel_angle")),
-        ("simulation, any friction", partial(_run, mecanum)),
-        ("acceleration, any friction", partial(acceleration, loop_robot, np.zeros(3), np.ones(3))),
-        ("fit, any friction", partial(_fit, mecanum, "twist")),
-        ("fit of counted angles, any friction", partial(_fit, mecanum, "wheel_angle")),
+        ("simulation, friction along the direction of travel", partial(_run, mecanum)),
+        ("fit, friction along the direction of travel", partial(_fit, mecanum, "twist", "wheel_angle")),
         ("fit in a speed loop", partial(_fit, loop_robot, "twist")),
+        ("simulation, any friction", partial(_run, held)),
+        ("acceleration, any friction", partial(acceleration, loop_robot, np.zeros(3), np.ones(3))),
+        ("fit, any friction", partial(_fit, held, "twist")),
+        ("fit in a speed loop, any friction", partial(_fit, held_loop, "twist")),
         ("simulation, inductance", partial(_run, winding)),
         ("simulation, friction that falls with speed", partial(_run, falling_robot)),
         ("simulation, wheels that slip", partial(_run, slips)),
@@ -79,11 +84,7 @@ def shared_out(robot: Robot) -> AbstractContextManager[None]:
 
 
 def needed_late() -> None:
-    """Runs of what a fit by the implicit engine needs beside its derivatives, which take longer to compile than these.
-
-    The kernels that add up rows are called as the fit calls them, on next to nothing.
-    """
-    _run(load_robot("mecanum"))
+    """What a fit by steps needs beside its march: the kernels that add up rows, called as the fit calls them."""
     row_terms(np.zeros((1, 2)), np.ones(1), 0.0, None, np.ones(1), False)
     row_squares(np.zeros((1, 2, 1)), np.zeros((1, 2)))
     _remember()

@@ -10,6 +10,7 @@ import omnidyn
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.code.c_model import c_model
 from tests.support.exported import STRICT, Stepper, exact_robot, init_robot, program
+from tests.support.friction_shapes import implicit
 from tests.support.mixed_robots import random_robot, with_band, with_bristles, with_stribeck
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
@@ -79,12 +80,16 @@ def test_it_is_cpp_too(tmp_path):
 
 @pytest.mark.parametrize("seed", [2, 3, 11])  # a disc and a dead band; a box behind a latency; an ellipse that holds
 def test_robots_of_init_are_the_engine_at_its_tolerance(seed, tmp_path):
-    """Reversals and rests. What a latency does is left out: the volts of the C act at once."""
+    """Reversals and rests. What a latency does is left out: the volts of the C act at once.
+
+    C has the implicit engine; what `simulate` takes for such a robot is within both tolerances.
+    """
     robot, dt = init_robot(seed), 2.0**-9
     volts = program(robot, seed, 300) * robot.motor.voltage_limit / 6.0
     at_once = robot.replace(drive=robot.drive.replace(latency=0.0))
-    run = omnidyn.simulate(at_once, volts, dt)
+    run = omnidyn.simulate(implicit(at_once), volts, dt)
     assert "implicit engine, tol 1e-06" in run.source
+    assert (np.abs(omnidyn.simulate(at_once, volts, dt).twist - run.twist) <= [2e-6, 2e-6, 2e-5]).all()
     assert 0.1 < np.mean(run.twist == 0.0) < 0.95
     twist, pose = Stepper(robot, tmp_path / "c").run(volts, dt)
     np.testing.assert_allclose(twist, run.twist, rtol=0, atol=1e-7)
