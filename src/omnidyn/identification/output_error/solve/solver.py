@@ -185,7 +185,7 @@ class Solver(Generic[P]):
             still_parameters, shift = held_parameters | blocked_parameters, np.zeros(len(held_parameters))
             is_near = normal.distance_without(still_parameters) < BEND_DISTANCE
             if self._scatter and self.engine.tol and damping < FIRM_DAMPING and is_near:
-                damping = near_damping  # what numbers go together by is known by priors alone: much would hold it
+                damping = near_damping = 0.1 * near_damping  # much would hold what only priors tell apart
             while not is_better and (distance := normal.distance_without(still_parameters)) / (1.0 + damping) > (
                 self.close if damping < FIRM_DAMPING else self._kink
             ):
@@ -200,8 +200,8 @@ class Solver(Generic[P]):
                 )
                 if not is_better and damping == near_damping and share * distance > self._kink:
                     is_wild = trial.objective - state.objective >= MOST_RISE * distance  # a way that rounding made
-                    if is_wild and damping < MOST_NEAR_DAMPING:
-                        damping = near_damping = min(max(100.0 * damping, LEAST_DAMPING), MOST_NEAR_DAMPING)
+                    if (is_wild or damping) and damping < MOST_NEAR_DAMPING:
+                        damping = near_damping = max(100.0 * damping, LEAST_DAMPING)
                         continue
                     if share > LEAST_STEP:  # a valley: shorter, but the same way
                         share, is_halved = 0.5 * share, True
