@@ -4,7 +4,6 @@ import contextlib
 import os
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -74,20 +73,16 @@ def test_one_that_dies_leaves_the_work_to_us(alone):
 @pytest.mark.parametrize("ends", [KeyboardInterrupt, ValueError])
 def test_whatever_ends_us_ends_the_other(alone, ends):
     module, children = alone
-    begun = time.monotonic()
     with contextlib.suppress(ends), compiled_elsewhere(module.twice, module.waits):
         raise ends
-    assert time.monotonic() - begun < 10.0
-    assert children[0].returncode not in (None, 0)
+    assert children[0].returncode not in (None, 0)  # 0: it was waited for
 
 
 def test_it_is_not_waited_for(alone):
     module, children = alone
-    begun = time.monotonic()
     with compiled_elsewhere(module.twice, module.waits):
         assert children[0].poll() is None
-    assert time.monotonic() - begun < 10.0
-    assert children[0].returncode not in (None, 0)
+    assert children[0].returncode not in (None, 0)  # 0: it was waited for
 
 
 def test_one_processor_shares_nothing(alone, monkeypatch):

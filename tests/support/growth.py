@@ -8,6 +8,7 @@ from typing import Any
 
 ROUNDS = 7  # what else a machine does only adds: the least of so many counts
 FACTOR = 4  # between two sizes
+NUMBERS = itertools.count()
 LINEAR = 8.0  # a linear call takes 4 times as long, a quadratic one 16 times
 
 
@@ -34,5 +35,4 @@ def growth(call: Callable[[int, int], Any], size: int, enough: float = LINEAR, f
 
     call: gets the size and a number that no call before had, so that no answer is remembered. size: of the large one.
     """
-    numbers = itertools.count()
-    return ratio(lambda: call(size // factor, next(numbers)), lambda: call(size, next(numbers)), enough)
+    return ratio(lambda: call(size // factor, next(NUMBERS)), lambda: call(size, next(NUMBERS)), enough)
