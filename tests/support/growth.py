@@ -1,5 +1,6 @@
 """How what a call takes grows with its input: a ratio of processor times, which no slow or busy machine changes."""
 
+import gc
 import itertools
 import math
 import time
@@ -13,10 +14,15 @@ LINEAR = 8.0  # a linear call takes 4 times as long, a quadratic one 16 times
 
 
 def spent(call: Callable[[], Any]) -> float:
-    """Processor time of a call [s]."""
-    begun = time.process_time()
-    call()
-    return time.process_time() - begun
+    """Processor time of a call [s], without that of the collector, whose turns come now and then."""
+    was_on, begun = gc.isenabled(), time.process_time()
+    gc.disable()
+    try:
+        call()
+        return time.process_time() - begun
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def ratio(small: Callable[[], Any], large: Callable[[], Any], enough: float) -> float:
