@@ -50,7 +50,7 @@ def hits(compiled):
 def test_what_the_other_process_compiled_is_taken(alone):
     module, children = alone
     with compiled_elsewhere(module.twice, module.needs_it):
-        assert [child.wait(60.0) for child in children] == [0]
+        assert [child.wait(600.0) for child in children] == [0]
     module.needs_it()
     assert hits(module.twice) == 1
 
@@ -65,7 +65,7 @@ def test_nothing_is_started_where_it_is_there(alone):
 def test_one_that_dies_leaves_the_work_to_us(alone):
     module, children = alone
     with compiled_elsewhere(module.twice, module.dies):
-        assert children[0].wait(60.0) == 3
+        assert children[0].wait(600.0) == 3
         module.needs_it()
     assert hits(module.twice) == 0
 
