@@ -88,7 +88,9 @@ def named(logs: Sequence[LogFile], robot: str) -> tuple[list[str], dict[str, str
     if len({log.reading for log in logs}) == 1:
         return [], {log.key: log.name for log in logs}, logs[0].flags
     lines = [
-        shlex.join(["omnidyn", "convert", log.name, log.si_name, *_flag(robot), *log.flags]) for log in logs if log.flags
+        shlex.join(["omnidyn", "convert", log.name, log.si_name, *_flag(robot), *log.flags])
+        for log in logs
+        if log.flags
     ]
     return lines, {log.key: log.si_name if log.flags else log.name for log in logs}, []
 

@@ -1,6 +1,5 @@
 """Mutated and random files: only an OmnidynError leaves a reader, and none hangs; the benchmark asks for 2 s too."""
 
-
 import pytest
 
 from benchmarks import fuzz_readers
