@@ -232,7 +232,7 @@ class Folder:
                 )
 
     def done(self, shards: Iterable[int]) -> tuple[int, ...]:
-        """Those of some shards that are there with their record. Raises InputError for one that its record is not of."""
+        """Those of some shards that are there, with a record. Raises InputError where one differs from its record."""
         manifest, done, faults = self.manifest, list[int](), dict[Path, tuple[str, str, str]]()
         for shard in shards:
             path, record = self.shard_path(shard), self.shard_path(shard, RECORD)
@@ -255,9 +255,7 @@ class Folder:
         parquet.write_table(pyarrow.table(dict(columns)), sink, write_page_checksum=True)
         content, manifest = sink.getvalue().to_pybytes(), self.manifest
         record = Record(sha256(content), manifest.rows(shard), manifest.sha256)
-        self.shard_path(shard, RECORD).unlink(
-            missing_ok=True
-        )  # of a shard that was there: until the end it is not done
+        self.shard_path(shard, RECORD).unlink(missing_ok=True)  # a shard that was there is not done until the end
         try:
             write_atomic(self.shard_path(shard), content, force=True)
             write_atomic(self.shard_path(shard, RECORD), record.to_json(), force=True)
