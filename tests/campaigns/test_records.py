@@ -43,6 +43,14 @@ def copied(finished, tmp_path):
     return tmp_path / "c"
 
 
+def same_record(damaged, whole):
+    """Whether a record with a flipped bit says the same: a blank is another one."""
+    try:
+        return json.loads(damaged) == json.loads(whole)
+    except ValueError:
+        return False
+
+
 def followed(error, folder):
     """Do what a remedy says; the hash of what is merged then."""
     files, resume = re.fullmatch(r"delete (.*), then make it again: omnidyn sweep resume (.*)", error.remedy).groups()
@@ -61,9 +69,7 @@ def test_a_shard_that_changed_is_named_by_all_who_read_it(copied, finished, name
         content = bytearray(shard.read_bytes())
         content[len(content) // 2] ^= 1
         shard.write_bytes(content)
-    with pytest.raises(
-        InputError, match="this shard has changed since it was written; got SHA-256 .*expected"
-    ) as caught:
+    with pytest.raises(InputError, match=r"has changed since it was written; got SHA-256 .*expected") as caught:
         READERS[name](copied)
     assert caught.value.where == str(shards[0])
     assert not (copied / "merged.parquet").exists()
@@ -80,13 +86,10 @@ def test_no_flip_of_a_bit_is_silent(copied, finished):
             damaged = bytearray(whole)
             damaged[draw.randrange(len(damaged))] ^= 1 << draw.randrange(8)
             path.write_bytes(damaged)
-            try:
-                merged = sha256(load_campaign(copied).folder.merge().read_bytes())
-            except InputError as error:
-                assert "00001" in error.where
-            else:  # a blank of JSON is another blank
-                assert ending == ".json"
-                assert merged == finished[1]
+            if ending == ".json" and same_record(damaged, whole):
+                continue
+            with pytest.raises(InputError, match="00001"):
+                load_campaign(copied).folder.merge()
         path.write_bytes(whole)
     assert sha256(load_campaign(copied).folder.merge().read_bytes()) == finished[1]
 
@@ -105,7 +108,7 @@ def test_a_shard_that_belongs_elsewhere_is_named(copied, finished, tmp_path):
         sweep(SMALL | {"seed": 7}, tmp_path / "other", task=product, executor=thread)
     for ending in (".parquet", ".json"):
         shutil.copy(tmp_path / "other" / "shards" / f"00001{ending}", shards)
-    with pytest.raises(InputError, match="this shard belongs to another manifest; got .*00001") as caught:
+    with pytest.raises(InputError, match=r"this shard belongs to another manifest; got .*00001") as caught:
         load_campaign(copied).folder.merge()
     assert followed(caught.value, copied) == finished[1]
 
