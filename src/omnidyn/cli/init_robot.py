@@ -351,8 +351,8 @@ def _as_seen(robot: Robot, geometry: Geometry | None, from_logs: set[str], gear:
     if gear is not None:
         if min(abs(ratio - 1.0), abs(ratio / gear - 1.0)) > CONTRADICTED:
             say(
-                f"omnidyn: warning: logged speeds are {ratio:.4g} times those of such wheels; expected 1, or {gear:g} at "
-                "the motor: check --gear-ratio, --wheel-radius and the unit of the speeds; --gear-ratio is kept"
+                f"omnidyn: warning: logged speeds are {ratio:.4g} times those of such wheels; expected 1, or {gear:g} "
+                "at the motor: check --gear-ratio, --wheel-radius and the unit of the speeds; --gear-ratio is kept"
             )
         return robot
     if ratio < GEARED and not geometry.at_motor:
