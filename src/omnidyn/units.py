@@ -34,7 +34,7 @@ class Unit(NamedTuple):
 
 _TABLE: dict[str, dict[str, float]] = {
     TIME: {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
-    VOLTAGE: {"V": 1.0, "mV": 1e-3, "volt": 1.0, "volts": 1.0},
+    VOLTAGE: {"V": 1.0, "mV": 1e-3, "cV": 1e-2, "dV": 0.1, "volt": 1.0, "volts": 1.0},
     CURRENT: {"A": 1.0, "mA": 1e-3, "amp": 1.0, "amps": 1.0},
     DUTY: {"duty": 1.0, "%": 0.01, "percent": 0.01, "pct": 0.01, "pwm": 1.0 / 255.0},
     LENGTH: {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "in": 0.0254, "inch": 0.0254, "ft": 0.3048},
