@@ -21,8 +21,8 @@ class Range(NamedTuple):
     """What is usual of a channel, in SI.
 
     most: what its usual size can be. likely: low and high end of what it mostly is, which tells the unit. units: those
-    in which it is logged too, the likeliest first. counts: how a unit of counts is written, "" where none is logged; most_counts:
-    the largest of them.
+    in which it is logged too, the likeliest first. counts: how a unit of counts is written, "" where none is logged;
+    most_counts: the largest of them.
     """
 
     most: float
