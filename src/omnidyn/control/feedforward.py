@@ -23,13 +23,50 @@ from omnidyn.errors import InputError
 from omnidyn.model.dynamics import motor_wrench
 from omnidyn.model.inverse import Effort, Inverse, inverse
 from omnidyn.model.mass import per_mass
+from omnidyn.model.motor import Drive, no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 
 DT = 0.02  # [s] between two steps, where nobody says
 FADE = 0.25  # on paths and floors beside, errors no longer fall below it, while voltages grow restless
 MOST_DELAY = 100  # [steps]
+LEAST_GAIN, MOST_EMF, MOST_VOLTS = 1e-6, 999.0, 9e4  # [V s/rad], [V s/rad] of a motor, [V]
 SHORTEST_STEP, LONGEST_STEP = 1e-5, 10.0  # [s] that may lie between two steps
+
+
+class LoopMotor(NamedTuple):
+    """A drive with a speed loop as motors of volts: what its proportional part does is back-EMF, its command a voltage.
+
+        u = k (c - w) + k_i sum,   k = k_p + k_i share dt        so  u = U - k w + k_i sum  with  U = k c
+
+    robot: the same with K_v l + k [V s/rad] at each wheel, and the volts U of the fastest command as voltage limit.
+    gain: k, which makes volts U of a command, shape (wheels,). sum: k_i [V/rad], shape (wheels,). share: of the sum of
+    a step that acts within it: a half on a slow robot, all of it on one that settles at once.
+    """
+
+    robot: Robot
+    gain: FloatArray
+    sum: FloatArray
+
+
+def loop_motor(robot: Robot, dt: float) -> LoopMotor:
+    """The motors that a speed loop makes of those of a robot, for steps of dt [s]."""
+    drive, motor, count = robot.drive, robot.motor, robot.wheels.count
+    emf, gear = per_wheel(motor.emf_constant, count), per_wheel(motor.gear_ratio, count)
+    proportional, integral = per_wheel(drive.kp, count), per_wheel(drive.ki, count)
+    fastest = no_load_speed(motor, per_wheel(motor.voltage_limit, count))
+
+    most = np.minimum(MOST_EMF * gear - emf, MOST_VOLTS / fastest)
+
+    def with_gain(wanted: FloatArray) -> tuple[Robot, FloatArray]:
+        gain = np.clip(wanted, LEAST_GAIN, most)
+        motors = motor.replace(emf_constant=tuple(emf + gain / gear), voltage_limit=tuple(gain * fastest))
+        return robot.replace(motor=motors, drive=Drive(dead_band=drive.dead_band, latency=drive.latency)), gain
+
+    stiff, _ = with_gain(proportional + 0.5 * dt * integral)
+    settles = max(dt * float(np.mean(step_matrices(inverse(stiff), dt).rates)), 1e-3)
+    share = -1.0 / settles - 1.0 / np.expm1(-settles)
+    return LoopMotor(*with_gain(proportional + share * dt * integral), integral)
 
 
 def voltage_for(robot: Robot, twist: ArrayLike, acceleration: ArrayLike) -> FloatArray:

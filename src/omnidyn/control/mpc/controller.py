@@ -44,7 +44,7 @@ from omnidyn.control.controller import (
     vector,
     without_slip,
 )
-from omnidyn.control.feedforward import DT, check_dt
+from omnidyn.control.feedforward import DT, check_dt, loop_motor
 from omnidyn.control.filtered_twist import FilteredTwist, filtered_twist
 from omnidyn.control.late_pose import LatePose, late_pose
 from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Batch, Memory, MpcWorkspace, control_step, expect
@@ -55,7 +55,6 @@ from omnidyn.control.pose_gate import TRUSTED, PoseGate
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope
-from omnidyn.model.wheels import wheel_speed
 
 HORIZON, MOST_HORIZON, MOST_DELAY = 20, 500, 50
 MET = 1e-5  # [V] from a limit
@@ -109,6 +108,9 @@ class Mpc:
         self.robot, self.output, self.limit = robot, output_kind(robot), output_limit(robot)
         self.sensors = robot.sensor_model
         self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == "duty" else 1.0
+        loop = loop_motor(robot, self.dt) if self.output == WHEEL_SPEED else None
+        driven = robot if loop is None else loop.robot  # by volts
+        self._per_command = np.ones(robot.wheels.count) if loop is None else 1.0 / loop.gain
         steps = min(robot.drive.latency / self.dt, float(MOST_DELAY)) if self.delay is None else float(self.delay)
         self.steps_late = round(steps)
         is_whole = abs(steps - self.steps_late) < LEAST_REST
@@ -116,12 +118,12 @@ class Mpc:
         rest = 0.0 if is_whole else (steps - whole) * self.dt
         self._zeros = np.zeros(robot.wheels.count)
         self._preview = Preview(self.dt, whole, self.horizon, rest)
-        self._room = MpcWorkspace.of(self.horizon, volts(robot))
+        self._room = MpcWorkspace.of(self.horizon, volts(driven))
         if rest > 0.0:
-            self._room.rest[:] = numbers(robot, rest, self.friction).linear
-        self._numbers = numbers(robot, self.dt, self.friction)
-        self.robot_settings = self.settings.of(robot)
-        self._tables = self.settings.tables(robot, self.dt, self.observer)
+            self._room.rest[:] = numbers(driven, rest, self.friction, loop).linear
+        self._numbers = numbers(driven, self.dt, self.friction, loop)
+        self.robot_settings = self.settings.of(robot, driven)
+        self._tables = self.robot_settings.tables(driven, self.dt, self.observer)
         self._late_pose = late_pose(robot, self.dt, self._late_pose)
         self._filtered_twist = filtered_twist(robot, self._filtered_twist)
         self._gate = PoseGate(robot, self.dt, vars(self).get("_gate"))
@@ -263,7 +265,7 @@ class Mpc:
         self._known = True
         sent = self._memory.u[0] * self._per_volt
         if self.output == WHEEL_SPEED:
-            sent = self._speeds()
+            sent = np.clip(self._memory.u[0] * self._per_command, -self.limit, self.limit)
         elif self._per_volt != 1.0:
             sent = np.clip(sent, -self.limit, self.limit)
         self._last = sent
@@ -278,17 +280,6 @@ class Mpc:
         self.reset()
         self._t = t
         return self._other(FAILED, start)
-
-    def _speeds(self) -> FloatArray:
-        """Speeds of the wheels [rad/s] by which the loop of the drive makes the volts wanted.
-
-        A loop without a sum, u = k_p (command - speed), needs u/k_p more than the speed; one with a sum finds u itself.
-        """
-        x, drive = self._memory.x, self.robot.drive
-        speed = wheel_speed(self.robot.wheels, 0.5 * (x[0, 3:] + x[1, 3:]))
-        if not np.any(drive.ki):
-            speed = speed + self._memory.u[0] / drive.kp
-        return np.clip(speed, -self.limit, self.limit)
 
     def _timing(self, t: float, since: float) -> str:
         """A word where the time of a step is wrong; what was remembered goes where a clock went back."""

@@ -105,11 +105,12 @@ class Settings:
         if self.volts is not None and not 1e-9 <= self.volts <= 1e9:
             raise InputError("out of range", got=self.volts, expected="1e-09 to 1e+09, or None", where="volts")
 
-    def of(self, robot: Robot) -> Settings:
-        """The settings with a number in place of each None, for a robot.
+    def of(self, robot: Robot, driven: Robot | None = None) -> Settings:
+        """The settings with a number in place of each None, for a robot; driven: as its speed loop lets it be driven.
 
         A heavier robot has more of what its model does not know, and pays less for the volts that correct it. Both laws
-        were found beside others on `bench control_real`.
+        were found beside others on `bench control_real`. A volt that a speed loop answers with more back-EMF speeds it
+        up by less, and costs less by the square of that.
         """
         heavier = min(max(robot.body.mass / PAPER_MASS, 0.1), 100.0)
         pose = tuple(heavier * weight for weight in POSE) if self.pose is None else self.pose
@@ -118,6 +119,8 @@ class Settings:
         if volts is None:
             per_volt = per_mass(robot, motor_wrench(robot).driving)[:, :2]
             volts = VOLTS * min(max(round(float(np.sum(per_volt**2)) / PER_VOLT_SQUARE, 12), 1e-3), 1e3)
+            if driven is not None and driven is not robot:
+                volts *= float(np.sum(emf(robot) ** 2) / np.sum(emf(driven) ** 2))
         sensors, pose_noise = robot.sensor_model, self.pose_noise
         if pose_noise is None:
             late = sensors.pose_delay > 0.0 or sensors.pose_rate is not None
