@@ -190,6 +190,30 @@ class Volts:
         return np.clip(effort.voltage, -self.limit, self.limit), met
 
 
+class LoopCommands:
+    """Motions as commands of a speed loop, step by step: made ready for steps of dt [s]; friction: as of `Volts`.
+
+        command = (volts - k_i sum)/k,    sum+ = sum + dt (command - mean speed of the wheels)
+
+    The volts are those of the `LoopMotor`. The sum is that of a robot which moves as wanted: what the loop sums up
+    beyond it is its own answer to what the model misses.
+    """
+
+    def __init__(self, robot: Robot, dt: float, friction: bool = True) -> None:
+        self.loop, self.wheels = loop_motor(robot, dt), robot.wheels
+        self.volts = Volts(self.loop.robot, dt, friction)
+        held = self.volts.held
+        self._mean_then = np.linalg.solve(held.A, held.gain - dt * np.eye(3)) @ held.back / dt
+        self._mean_now = held.gain / dt - self._mean_then @ held.decay
+        self.early = float(np.mean(np.diag(self._mean_then))) - 0.5  # of a step, by which a robot is faster than a ramp
+
+    def command(self, now: FloatArray, then: FloatArray, total: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(command, mean speed of the wheels) [rad/s] of a step from twist to twist (3,); total: the sum (wheels,)."""
+        voltage = self.volts.softly(now, self.volts.change(now, then), then).voltage
+        mean = product(self._mean_now, now) + product(self._mean_then, then)
+        return (voltage - self.loop.sum * total) / self.loop.gain, wheel_speed(self.wheels, mean)
+
+
 def _fade(model: Inverse, dt: float) -> FloatArray:
     """The speed of each axis below which its dry friction is compensated in part [m/s, m/s, rad/s]. Shape (3,).
 

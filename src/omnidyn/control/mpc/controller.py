@@ -32,6 +32,7 @@ from omnidyn.control.controller import (
     OK,
     PATH_ENDED,
     TIME_STANDS_STILL,
+    VOLTAGE,
     WAITING,
     WHEEL_SPEED,
     Info,
@@ -97,6 +98,11 @@ class Mpc:
         self.reset()
 
     @property
+    def per_volt(self) -> float | FloatArray:
+        """What is sent for a volt."""
+        return self._per_volt * self._per_command
+
+    @property
     def late_part(self) -> float:
         """By how much the delay of the drive is more than whole steps [s]."""
         return self._preview.rest
@@ -109,8 +115,8 @@ class Mpc:
         self.sensors = robot.sensor_model
         self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == "duty" else 1.0
         loop = loop_motor(robot, self.dt) if self.output == WHEEL_SPEED else None
-        driven = robot if loop is None else loop.robot  # by volts
-        self._per_command = np.ones(robot.wheels.count) if loop is None else 1.0 / loop.gain
+        self.driven = driven = robot if loop is None else loop.robot  # by volts
+        self._per_command = 1.0 if loop is None else 1.0 / loop.gain
         steps = min(robot.drive.latency / self.dt, float(MOST_DELAY)) if self.delay is None else float(self.delay)
         self.steps_late = round(steps)
         is_whole = abs(steps - self.steps_late) < LEAST_REST
@@ -263,10 +269,8 @@ class Mpc:
         elif passes < 0:
             return self._failed(t, passes, start)
         self._known = True
-        sent = self._memory.u[0] * self._per_volt
-        if self.output == WHEEL_SPEED:
-            sent = np.clip(self._memory.u[0] * self._per_command, -self.limit, self.limit)
-        elif self._per_volt != 1.0:
+        sent = self._memory.u[0] * self.per_volt
+        if self.output != VOLTAGE:
             sent = np.clip(sent, -self.limit, self.limit)
         self._last = sent
         status = INACCURATE if inaccurate else PATH_ENDED if t > preview.end else OK
