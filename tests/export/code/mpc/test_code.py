@@ -113,7 +113,7 @@ def test_in_double_precision_its_formulas_are_those_of_python(sensors, drive, tm
         given = [each.ctypes.data_as(ctypes.c_void_p) for each in (seen[:3].copy(), seen[3:].copy(), rows, found)]
         library.omnidyn_control_step(ctypes.c_void_p(one), ctypes.c_double(t - times[k - 1] if k else 0.0), *given)
         sent = own.step(t, seen[:3], seen[3:], follow)
-        apart.append(np.abs(found - sent).max())
+        apart.append(np.abs(found - sent).max() * 6.0 / own.limit.max())
         for _ in range(1 + (k == 59)):
             live.step(sent)
     assert np.median(apart) < 1e-5  # [V]; its numbers have nine digits
