@@ -128,7 +128,7 @@ class Mpc:
         if rest > 0.0:
             self._room.rest[:] = numbers(driven, rest, self.friction, loop).linear
         self._numbers = numbers(driven, self.dt, self.friction, loop)
-        self.robot_settings = self.settings.of(robot, driven)
+        self.robot_settings = self.settings.of(robot, None if loop is None else driven)
         self._tables = self.robot_settings.tables(driven, self.dt, self.observer)
         self._late_pose = late_pose(robot, self.dt, self._late_pose)
         self._filtered_twist = filtered_twist(robot, self._filtered_twist)
