@@ -17,13 +17,13 @@ from scipy.linalg import expm
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray, product
-from omnidyn.control.controller import WHEEL_SPEED, Guarded
+from omnidyn.control.controller import WHEEL_SPEED, Guarded, output_limit
 from omnidyn.control.paths.motion import Path
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import motor_wrench
 from omnidyn.model.inverse import Effort, Inverse, inverse
 from omnidyn.model.mass import per_mass
-from omnidyn.model.motor import Drive, no_load_speed
+from omnidyn.model.motor import Drive
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 
@@ -54,7 +54,7 @@ def loop_motor(robot: Robot, dt: float) -> LoopMotor:
     drive, motor, count = robot.drive, robot.motor, robot.wheels.count
     emf, gear = per_wheel(motor.emf_constant, count), per_wheel(motor.gear_ratio, count)
     proportional, integral = per_wheel(drive.kp, count), per_wheel(drive.ki, count)
-    fastest = no_load_speed(motor, per_wheel(motor.voltage_limit, count))
+    fastest = output_limit(robot)
 
     most = np.minimum(MOST_EMF * gear - emf, MOST_VOLTS / fastest)
 

@@ -187,6 +187,7 @@ class Mpc:
             self.robot_settings,
             self._preview,
             PoseGate(self.robot, self.dt),
+            self._per_command,
             _whole("count", count, 1, 10_000_000),
         )
 

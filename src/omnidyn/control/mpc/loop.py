@@ -310,7 +310,7 @@ def control_batch(numbers, tables, previews, start, states, elapsed, memories, r
 
 
 class Batch:
-    """The controllers of `count` robots; made by `Mpc.batch`. Gives volts."""
+    """The controllers of `count` robots; made by `Mpc.batch`. Gives volts, or commands of a speed loop."""
 
     def __init__(
         self,
@@ -320,10 +320,11 @@ class Batch:
         settings: Settings,
         preview: Preview,
         gate: PoseGate,
+        per_volt: float | FloatArray,
         count: int,
     ) -> None:
         self.count, self._numbers, self._tables, self._room, self._settings = count, numbers, tables, room, settings
-        self._like, self._gate = preview, gate
+        self._like, self._gate, self._per_volt = preview, gate, per_volt
         self.reset()
 
     def reset(self) -> None:
@@ -334,7 +335,7 @@ class Batch:
         self._previews: list[Preview] = []
 
     def step_batch(self, t: float, pose: FloatArray, twist: FloatArray, path: Any | Sequence[Any]) -> FloatArray:
-        """Volts of all robots from t [s] on, shape (count, wheels). Steps are `dt` apart.
+        """Volts (commands of a speed loop) of all robots from t [s] on, shape (count, wheels). Steps are `dt` apart.
 
         pose, twist: shape (count, 3), as in `Mpc.step`. path: one for all, or one for each. Who is
         nowhere, NaN, gets zeros.
@@ -359,7 +360,7 @@ class Batch:
         elapsed = np.where(self._known, self._numbers.linear[0, STEP], 0.0)
         passes = control_batch(self._numbers, self._tables, previews, start, state, elapsed, memory, self._room)
         self._known = (passes >= 0) | (passes <= INACCURATE_STEP)
-        sent = memory.u[:, 0].copy()
+        sent = memory.u[:, 0] * self._per_volt
         sent[~self._known] = 0.0
         memory.sent[~self._known] = 0.0
         return sent
