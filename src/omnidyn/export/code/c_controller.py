@@ -56,13 +56,14 @@ def c_controller(robot: Robot, controller: str | os.PathLike = "pid", dt: float 
     law, omissions = spec.make(robot, dt=dt), left_out(KIND, robot)
     if robot.sensor_model.in_steps(dt).twist_filter > 0.0:
         omissions = (*omissions, FILTERED)
+    notes = (*NOTES, *map(str, robot.pose_lag_of_log))
     predicts = isinstance(law, Mpc)
     code = mpc_code(law) if predicts else control_code(law)  # pyright: ignore[reportArgumentType]  none is refused
     about = [f"{law.name} of {robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in omissions)]
     head = c_comment(about)
     code = "\n\n".join([f"{head}\n{_INCLUDES.rstrip()}", _late_pose_code(law), code])
     texts = {"omnidyn_control.h": _header(law, head), "omnidyn_control.c": f"{code}\n"}
-    return Export(KIND, robot.name, texts, omissions, NOTES, folder=True)
+    return Export(KIND, robot.name, texts, omissions, notes, folder=True)
 
 
 def _header(law: Any, about: str) -> str:
