@@ -116,7 +116,9 @@ def test_a_fit_to_counts_of_wheels_gives_means_and_says_what_controllers_take_of
     volts = np.repeat(rng.uniform(-5.0, 5.0, (n // 25, 3)), 25, axis=0)
     run = omnidyn.simulate(robot, volts, dt)
     tick = 2.0 * np.pi / 4096
-    angle = np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * (run.wheel_speed[1:] + run.wheel_speed[:-1]) * dt, axis=0)])
+    angle = np.concatenate(
+        [np.zeros((1, 3)), np.cumsum(0.5 * (run.wheel_speed[1:] + run.wheel_speed[:-1]) * dt, axis=0)]
+    )
     pose = run.pose[np.maximum(np.arange(len(run.t)) - late, 0)] + 5e-4 * rng.standard_normal(run.pose.shape)
     log = omnidyn.Run(t=run.t, voltage=run.voltage, wheel_angle=np.round(angle / tick) * tick, pose=pose)
     found = omnidyn.identify(log, robot)

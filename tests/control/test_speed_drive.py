@@ -29,7 +29,9 @@ def looped(ki: float, kp: float = 5.0) -> Robot:
 
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_what_a_loop_sums_up_is_known_whatever_its_gain(name):
-    off = [omnidyn.track(looped(ki), CIRCLE, name, duration=6.0).rmse_position for ki in (0.0, 1.0, 5.0, 25.0, 80.0, 250.0)]
+    off = [
+        omnidyn.track(looped(ki), CIRCLE, name, duration=6.0).rmse_position for ki in (0.0, 1.0, 5.0, 25.0, 80.0, 250.0)
+    ]
     assert max(off) < 3e-5  # [m]; mpc was 0.27 off, pid 0.006
     assert max(off) < 1.3 * min(off) + 1e-5
 
@@ -68,7 +70,9 @@ def test_many_in_one_are_one_each():
     for k in range(40):
         pose, twist = np.array(live.pose), np.array(live.twist)
         sent = one.step(k * one.dt, pose, twist, along)
-        np.testing.assert_array_equal(many.step_batch(k * one.dt, np.tile(pose, (2, 1)), np.tile(twist, (2, 1)), along)[1], sent)
+        np.testing.assert_array_equal(
+            many.step_batch(k * one.dt, np.tile(pose, (2, 1)), np.tile(twist, (2, 1)), along)[1], sent
+        )
         live.step(sent)
 
 
@@ -81,7 +85,9 @@ def test_a_wheel_that_turns_less_than_it_is_said_to_does_not_wind_up(observer):
         return control.step(t, pose, 1.02 * np.asarray(twist), follow)
 
     liar = SimpleNamespace(
-        **{name: getattr(control, name) for name in ("name", "robot", "output", "limit", "replace", "reset")}, step=step, info=control.info
+        **{name: getattr(control, name) for name in ("name", "robot", "output", "limit", "replace", "reset")},
+        step=step,
+        info=control.info,
     )
     found = omnidyn.track(LEKIWI, CIRCLE, liar, duration=40.0)
     assert found.rmse_position < 1e-3

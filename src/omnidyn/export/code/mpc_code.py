@@ -190,7 +190,9 @@ def _constants(controller: Mpc) -> str:
     lines += [f"#define {name} {c_number(float(value), True)}" for name, value in numbers.items()]
     matrices = _matrices(controller, linear) | ({"FRAME": _square(linear, TURNING)} if turning else {})
     matrices |= {"BY_MASS": _square(linear, BY_MASS)} if ellipse else {}
-    matrices |= {"SUM_DRIVE": _square(linear, SUM_DRIVE), "SUM_TWIST": _square(linear, SUM_TWIST)} if linear[SUM] else {}
+    matrices |= (
+        {"SUM_DRIVE": _square(linear, SUM_DRIVE), "SUM_TWIST": _square(linear, SUM_TWIST)} if linear[SUM] else {}
+    )
     if _current(controller):
         limit, emf = controller.robot_settings.tables(controller.driven, controller.dt, True)[2:4]
         matrices |= {"CURRENT_VOLTS": limit[1], "EMF": emf}

@@ -86,7 +86,9 @@ def in_double(text):
 
 
 @pytest.mark.parametrize("sensors", [None, MEAN])
-@pytest.mark.parametrize("drive", [ROBOT.drive, SUMMED.replace(latency=0.0), SUMMED], ids=["volts", "loop", "late loop"])
+@pytest.mark.parametrize(
+    "drive", [ROBOT.drive, SUMMED.replace(latency=0.0), SUMMED], ids=["volts", "loop", "late loop"]
+)
 def test_in_double_precision_its_formulas_are_those_of_python(sensors, drive, tmp_path):
     """What float32 hides: every number of the observer, the model and the program."""
     robot = ROBOT.replace(sensors=sensors, drive=drive)
