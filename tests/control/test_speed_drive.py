@@ -79,7 +79,7 @@ def test_many_in_one_are_one_each():
 @pytest.mark.parametrize("observer", [True, False])
 def test_a_wheel_that_turns_less_than_it_is_said_to_does_not_wind_up(observer):
     """Twists measured 2 % too large: the loop holds what its encoders say, for ever."""
-    control, along = Mpc(LEKIWI, observer=observer), path(CIRCLE)
+    control = Mpc(LEKIWI, observer=observer)
 
     def step(t, pose, twist, follow):
         return control.step(t, pose, 1.02 * np.asarray(twist), follow)

@@ -8,9 +8,10 @@ the robot is to move, the way back to the path included: nu_ref + (p/2) e, p the
 of a robot that nothing slows down; k_d itself falls below 0 where an axis by itself is faster than the loop may be.
 Without `feedforward` nothing is known of the robot but what its volts push.
 
-A drive with a speed loop is asked for a twist, nu_ref + k_p e + k_i sum e dt, by the commands that make it (LoopCommands):
+A drive with a speed loop is asked for a twist, nu_ref + k_p e + k_i sum e dt, by the commands that make it (see
+LoopCommands). p, q: what the fast and the slow pole leave of an error in a step:
 
-    k_p = (1 - p q)/dt,  k_i = (1 - p)(1 - q)/dt^2           p, q: what the fast and the slow pole leave of an error a step
+    k_p = (1 - p q)/dt,  k_i = (1 - p)(1 - q)/dt^2
 """
 
 from __future__ import annotations

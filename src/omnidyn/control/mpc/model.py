@@ -4,8 +4,8 @@
     twist+ = DECAY twist + PHI (a + ...),   displacement = PHI twist + PSI (a + ...)      exact for what is constant
 
 A, B: eqs (13) (14), with viscous friction of every shape and what spins in the mass matrix. PHI = integral of e^(A s),
-PSI = integral of PHI, both from 0 to dt. Where the drive has a speed loop, B u is that of its commands (`LoopMotor`), and d
-grows by dt (SUM_DRIVE a - SUM_TWIST mean twist) in a step: what the sum of the loop does to the robot.
+PSI = integral of PHI, both from 0 to dt. Where the drive has a speed loop, B u is that of its commands (`LoopMotor`),
+and d grows by dt (SUM_DRIVE a - SUM_TWIST mean twist) in a step: what the sum of the loop does to the robot.
 """
 
 from __future__ import annotations
