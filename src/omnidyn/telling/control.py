@@ -118,7 +118,8 @@ SENTENCES = {
     "steps_with_status": Sentence("{count} of {steps} steps: {subject}"),
     "pose_lag_of_log": Sentence(
         "controllers of {subject} take poses as {pose_delay:.3g} s old, as they were in the log of the fit; if yours "
-        'are new, such as those of odometry, write twist = "{twist}" and pose_delay_s = 0 under [sensors] of the robot file'
+        'are new, such as those of odometry, write twist = "{twist}" and pose_delay_s = 0 under [sensors] of the robot '
+        "file"
     ),
     "can_follow": Sentence(_can_follow),
     "cannot_follow": Sentence(_cannot_follow),
