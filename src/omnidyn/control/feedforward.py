@@ -201,17 +201,24 @@ class LoopCommands:
 
     def __init__(self, robot: Robot, dt: float, friction: bool = True) -> None:
         self.loop, self.wheels = loop_motor(robot, dt), robot.wheels
+        self.limit = per_wheel(robot.motor.voltage_limit, robot.wheels.count)
         self.volts = Volts(self.loop.robot, dt, friction)
         held = self.volts.held
         self._mean_then = np.linalg.solve(held.A, held.gain - dt * np.eye(3)) @ held.back / dt
         self._mean_now = held.gain / dt - self._mean_then @ held.decay
         self.early = float(np.mean(np.diag(self._mean_then))) - 0.5  # of a step, by which a robot is faster than a ramp
 
-    def command(self, now: FloatArray, then: FloatArray, total: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(command, mean speed of the wheels) [rad/s] of a step from twist to twist (3,); total: the sum (wheels,)."""
+    def command(
+        self, now: FloatArray, then: FloatArray, total: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(command [rad/s], mean speed of the wheels [rad/s], volts at the motors) of a step from twist to twist (3,).
+
+        total: the sum, shape (wheels,).
+        """
         voltage = self.volts.softly(now, self.volts.change(now, then), then).voltage
-        mean = product(self._mean_now, now) + product(self._mean_then, then)
-        return (voltage - self.loop.sum * total) / self.loop.gain, wheel_speed(self.wheels, mean)
+        twist = product(self._mean_now, now) + product(self._mean_then, then)
+        mean = wheel_speed(self.wheels, twist)
+        return (voltage - self.loop.sum * total) / self.loop.gain, mean, voltage - self.loop.gain * mean
 
 
 def _fade(model: Inverse, dt: float) -> FloatArray:

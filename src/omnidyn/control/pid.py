@@ -140,21 +140,21 @@ class Pid(Guarded):
         velocity: FloatArray,
         raised_sum: FloatArray,
     ) -> tuple[FloatArray, tuple[str, ...]]:
-        """The commands of a speed loop; at their limit, nothing is added to the sum of errors."""
+        """The commands of a speed loop; where the volts are at their limit, nothing is added to the sum of errors."""
         if self._reached is None:
             self._reached = twist
         else:
             self._loop_sum = self._loop_sum + dt * (self._last - self._mean)
-        met = False
-        for total in (raised_sum, self._sum):
-            then = self.wanted(off, heading, velocity, total)
-            sent, mean = self.commands.command(self._reached, then, self._loop_sum)
-            met = bool((np.abs(sent) >= self.limit).any())
-            if not met:
-                self._sum = total
-                break
+        then = self.wanted(off, heading, velocity, raised_sum)
+        sent, mean, volts = self.commands.command(self._reached, then, self._loop_sum)
+        share = float(np.max(np.abs(volts) / self.commands.limit))
+        if share <= 1.0:
+            self._sum = raised_sum
+        else:  # slower, as the motors can
+            then = self.wanted(off, heading, velocity, self._sum) / share
+            sent, mean, _ = self.commands.command(self._reached, then, self._loop_sum)
         self._reached, self._mean = then, mean
-        return sent, ("speed",) if met else ()
+        return sent, () if share <= 1.0 else ("voltage",)
 
     def wanted(self, off: FloatArray, heading: FloatArray, velocity: FloatArray, total: FloatArray) -> FloatArray:
         """The twist that a robot with a speed loop shall have a step later: as `aim` and `effort` (3,)."""

@@ -221,6 +221,8 @@ def control_code(controller: AnyOf) -> str:
         traced, body = _pid(controller) if isinstance(controller, Pid) else _speed(controller)
     helpers = [text for name, text in _HELPERS if f"{name}(" in "".join(traced)]
     tables = {"LIMIT": controller.limit} if controller.output == WHEEL_SPEED else _limits(controller)
+    if isinstance(controller, Pid) and controller.output == WHEEL_SPEED:
+        tables["VOLTAGE_LIMIT"] = controller.commands.limit
     constants = [f"static const float {name}[{len(table)}] = {{{_numbers(table)}}};" for name, table in tables.items()]
     numbers = {"FARTHEST": _c(LARGEST_STATE), "LARGEST": "3.0e38f", "LATEST": _c(LATEST * controller.dt)}
     numbers["STOPS"] = "\n    self->driven = 0;" if _is_commanded(controller) else ""
@@ -344,15 +346,27 @@ def _pid(controller: Pid) -> tuple[list[str], str]:
     )
     if controller.output == WHEEL_SPEED:
         count = controller.robot.wheels.count
-        names = {"off": (3,), "heading": (), "velocity": (3, 3), "total": (3,), "now": (3,), "loop": (count,)}
+        names = {
+            "off": (3,),
+            "heading": (),
+            "velocity": (3, 3),
+            "total": (3,),
+            "share": (),
+            "now": (3,),
+            "loop": (count,),
+        }
 
-        def commands(off: Any, heading: Any, velocity: Any, total: Any, now: Any, loop: Any) -> dict[str, Any]:
-            then = controller.wanted(off, heading, velocity, total)
-            sent, mean = controller.commands.command(now, then, loop)
-            return {"output": sent, "mean": mean, "then": then}
+        def commands(
+            off: Any, heading: Any, velocity: Any, total: Any, share: Any, now: Any, loop: Any
+        ) -> dict[str, Any]:
+            then = controller.wanted(off, heading, velocity, total) / share
+            sent, mean, volts = controller.commands.command(now, then, loop)
+            return {"output": sent, "mean": mean, "volts": volts, "then": then}
 
         call = filled(_COMMANDED, LONGEST=_c(MOST_STEPS * controller.dt)).strip()
-        return [_function("commands", names, commands, controller)], f"{head}, more[3], then[3];\n{gather}{call}"
+        return [
+            _function("commands", names, commands, controller)
+        ], f"{head}, more[3], volts[OMNIDYN_WHEELS], then[3], share = 1.0f;\n{gather}{call}"
 
     def efforts(off: Any, heading: Any, twist: Any, velocity: Any, total: Any) -> dict[str, Any]:
         return _named(controller.effort(controller.aim(off, heading, twist, velocity), total))
@@ -459,16 +473,16 @@ for (k = 0; k < 3; k++) {
     more[k] = self->sum[k] + off[k] * elapsed;
 }
 self->driven = 1;
-commands(off, pose[2], (const float(*)[3])velocity, more, self->reached, self->loop, output, self->mean, then);
+commands(off, pose[2], (const float(*)[3])velocity, more, 1.0f, self->reached, self->loop, output, self->mean, volts,
+         then);
 for (k = 0; k < OMNIDYN_WHEELS; k++) {
-    limited |= fabsf(output[k]) >= LIMIT[k];
+    share = fabsf(volts[k]) / VOLTAGE_LIMIT[k] <= share ? share : fabsf(volts[k]) / VOLTAGE_LIMIT[k];
 }
-if (limited) { /* at a limit, nothing is added to the sum */
+limited = !(share <= 1.0f);
+if (limited) { /* slower, and nothing is added to the sum */
     memcpy(more, self->sum, sizeof(more));
-    commands(off, pose[2], (const float(*)[3])velocity, more, self->reached, self->loop, output, self->mean, then);
-    for (limited = 0, k = 0; k < OMNIDYN_WHEELS; k++) {
-        limited |= fabsf(output[k]) >= LIMIT[k];
-    }
+    commands(off, pose[2], (const float(*)[3])velocity, more, share, self->reached, self->loop, output, self->mean,
+             volts, then);
 }
 memcpy(self->sum, more, sizeof(more));
 memcpy(self->reached, then, sizeof(then));
