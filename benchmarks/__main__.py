@@ -58,6 +58,7 @@ NAMES = {
     "studies": "intervals and false alarms over many draws: breakaway, laws, rounding, noise, motors (15 minutes)",
     "campaigns": "shards beside the batch kernel, a million closed loops, overhead of a shard on Dask (five minutes)",
     "studio_log": "a log of 3.6 million rows in the studio, in a browser: first word, picture, pans (2 minutes)",
+    "ordinary": "robots as people have them: one evaluation, a run, whole fits, beside goals (ten minutes)",
     "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",
 }
 ANSWERS = "answers"

@@ -77,8 +77,10 @@ class Motion:
     voltage: np.ndarray
 
 
-def drive(world: World, command: np.ndarray, dt: float, looped: bool = False) -> Motion:
-    """From rest under commands (n, wheels) held for dt each: volts, or wheel speeds [rad/s] of the firmware's loop."""
+def drive(world: World, command: np.ndarray, dt: float, looped: bool = False, step: float = STEP) -> Motion:
+    """From rest under commands (n, wheels) held for dt each: volts, or wheel speeds [rad/s] of the firmware's loop.
+
+    step [s]: the longest of RK4."""
     n = len(command)
     states, volts = np.zeros((n + 1, 9)), np.zeros(command.shape)
     kp, ki, rate = world.loop
@@ -86,7 +88,7 @@ def drive(world: World, command: np.ndarray, dt: float, looped: bool = False) ->
     _run(
         np.ascontiguousarray(command, dtype=float),
         dt,
-        STEP,
+        step,
         world.G,
         world.M,
         inverse,

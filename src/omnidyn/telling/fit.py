@@ -254,6 +254,7 @@ SENTENCES = {
             "fitted",
         )
     ),
+    "latency_like_zero": Sentence("these logs do not tell {latencies} from 0: the robot file has none of it"),
     "harmful_nuisance": Sentence(
         "{subject} improves the likelihood but worsens the prediction of held-out blocks of the log: it is not fitted"
     ),

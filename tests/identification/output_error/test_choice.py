@@ -85,6 +85,21 @@ def test_a_right_model_has_no_push_and_is_as_good_as_the_plain_fit(tmp_path):
     )
 
 
+def test_a_latency_that_a_log_cannot_tell_from_none_is_not_written(tmp_path, late):
+    """It would split every row of a run: it is reported with its interval, and the file has none."""
+    log = plain_robot.log(6)
+    noise = 1.0 * np.random.default_rng(7).normal(size=log.wheel_speed.shape)
+    noisy = log.replace(wheel_speed=log.wheel_speed + noise)
+    result = omnidyn.identify(noisy, plain_robot.robot(tmp_path), quick=True)
+    found = result.nuisances["latency.wheel_speed"]
+    assert 0.0 < abs(found.value) < 2.0 * found.std
+    assert result.robot.drive.latency == 0.0
+    assert result.robot.log is None or not result.robot.log.latency.wheel_speed
+    assert "latency_like_zero" in codes(result)
+    given, late_log = late
+    assert omnidyn.identify(late_log, given, quick=True).robot.drive.latency == pytest.approx(0.02, abs=0.002)
+
+
 def test_no_row_after_a_start_from_rest_is_left_out(tmp_path):
     """Voltage from the first row on, 20 ms late: what was before is known, and the first rows tell the latency."""
     log, given = plain_robot.log(7, late_rows=1, still=0, levels=3, held=15), plain_robot.robot(tmp_path)

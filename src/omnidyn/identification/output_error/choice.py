@@ -22,9 +22,13 @@ from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.uncertainty import trust
 from omnidyn.model.robot import Robot
+from omnidyn.progress import Progress
 from omnidyn.statement import NOTE, WARNING, Statement
 
 FORCE_ERRORS = 3.0  # standard errors by which a constant force is one
+SCREENING_STEPS = 3  # of a fit with a constant force, before it is known whether it pays
+FORCE_GAIN = 0.5 * FORCE_ERRORS**2  # of the likelihood, below which a constant force is none
+FORCE_SHARE = 0.5  # of what the better one gains: a constant force that gains less predicts no better
 
 
 def better_of(solution: Solution, plain_solution: Solution) -> Solution:
@@ -46,11 +50,21 @@ def better_of(solution: Solution, plain_solution: Solution) -> Solution:
     )
 
 
+def screened(solution: Solution, begun_fits: Sequence[Solution], progress: Progress) -> list[Solution]:
+    """The fits with a constant force each that may be taken, at their ends. begun_fits: after some steps."""
+    gains = [solution.state.objective - begun_fit.least_objective for begun_fit in begun_fits]
+    least_gain = max(FORCE_GAIN, FORCE_SHARE * max(gains))
+    pairs = zip(begun_fits, gains, strict=True)
+    return [begun_fit.gone_on(progress) for begun_fit, gain in pairs if gain >= least_gain]
+
+
 def best_with_force(solution: Solution, forced_solutions: Sequence[Solution]) -> Solution:
     """A fit, or the one of `forced_solutions`, which have a constant force each, that predicts best and clearly better.
 
     A step from the fit without does not see it: dry friction takes up to as much, and the numbers have gone elsewhere.
     """
+    if not forced_solutions:
+        return solution
     margins = margins_of([solution, *forced_solutions])
     run_without_force, runs = (
         free_run(solution, margins),

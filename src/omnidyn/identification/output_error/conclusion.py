@@ -88,7 +88,10 @@ def conclude(
     endless = [name for name, (_, (_, high)) in own_levels.items() if high == math.inf]
     fitted, correlation = problem.parameters[:robot_count], _correlation(names, uncertainty)
     robot = _with_levels(_robot(problem, values, std, open_names, data, bool(joint)), own_levels)
-    robot = with_nuisances(robot, problem, values, std, open_names, records, data)
+    none_told = latencies_like_zero(problem, values, uncertainty)
+    on_time = np.where([p.name in none_told for p in problem.parameters], 0.0, values)
+    robot = with_nuisances(robot, problem, on_time, std, open_names, records, data)
+    late_notes = [Statement("latency_like_zero", NOTE, numbers={"latencies": none_told})] if none_told else []
     return OutputErrorEstimate(
         robot=_together(robot, problem.parameters, std, uncertainty, correlation.matrix),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
@@ -103,6 +106,7 @@ def conclude(
         warnings=(
             *_warnings(solver, solution, uncertainty, records, blind_names),
             *_not_followed(missed_outputs),
+            *late_notes,
             *more_statements,
         ),
         method=f"output error, maximum likelihood, {loss}, {uncertainty.kind} covariance",
@@ -430,6 +434,26 @@ def _data(records: Sequence[Record]) -> str:
 # robot it is one delay, wherever on the way it arises. A gain, a fade, a tilt, a push, and what one channel is later
 # than
 # another belong to the logs, and stand in the table [log] with the marks of these.
+
+LATENCY_ERRORS = 2.0  # standard errors within which a latency is like none
+
+
+def latencies_like_zero(problem: Problem, values: FloatArray, uncertainty: Trust) -> tuple[str, ...]:
+    """Names of latencies that 0 may stand for: within LATENCY_ERRORS standard errors of it were all else exact.
+
+    So the other numbers, which were found beside it, predict the same without it.
+    """
+    names = [p.name for p in problem.parameters]
+    spreads = np.diag(uncertainty.covariance)
+    known = np.flatnonzero(np.isfinite(spreads) & (spreads > 0.0))
+    size = np.sqrt(spreads[known])
+    precision = np.linalg.pinv(uncertainty.covariance[np.ix_(known, known)] / np.outer(size, size), hermitian=True)
+    alone = size / np.sqrt(np.maximum(np.diag(precision), 1.0))  # of each, all others exact
+    return tuple(
+        names[j]
+        for j, std in zip(known.tolist(), alone.tolist(), strict=True)
+        if problem.parameters[j].part == LATENCY and 0.0 < abs(values[j]) <= LATENCY_ERRORS * std
+    )
 
 
 def with_nuisances(

@@ -19,7 +19,14 @@ from omnidyn.identification.grouping import count_once
 from omnidyn.identification.methods import AUTO, OutputError, degrees
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import ALL_LOGS, begun, group_names
-from omnidyn.identification.output_error.choice import beside_given, best_with_force, better_of, why_white
+from omnidyn.identification.output_error.choice import (
+    SCREENING_STEPS,
+    beside_given,
+    best_with_force,
+    better_of,
+    screened,
+    why_white,
+)
 from omnidyn.identification.output_error.conclusion import conclude, loss_words, unexplained
 from omnidyn.identification.output_error.joint import join, joint_start, own_names
 from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
@@ -31,14 +38,21 @@ from omnidyn.identification.output_error.prepare import (
     guesses,
 )
 from omnidyn.identification.output_error.problem.friction_laws import band_note, with_band
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, automatic, implausible
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, TRAVELS, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated
 from omnidyn.identification.output_error.problem.problem import Problem
-from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
+from omnidyn.identification.output_error.solve.by_steps import FIT_PRECISION, solve_by_steps
+from omnidyn.identification.output_error.solve.first_point import first_point
 from omnidyn.identification.output_error.solve.loop import FINE_TOLERANCE as LOOP_FINE
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Best, FitProgress
-from omnidyn.identification.output_error.solve.solver import KINK_PRECISION, Normal, Solution, Solver
+from omnidyn.identification.output_error.solve.solver import (
+    END_PRECISION,
+    MAX_ITERATIONS,
+    Normal,
+    Solution,
+    Solver,
+)
 from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_levels, find_breakaway
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import beside, differences, refuse_bootstrap, resampled
@@ -50,11 +64,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.progress import silent
 from omnidyn.run import Run, as_list
 from omnidyn.statement import WARNING, Statement
-
-HALFWAY_TOLERANCE = 3e-4  # [m/s] tolerance of the implicit engine on the way there
-FIT_PRECISION = (
-    1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,7 +315,8 @@ class Fit:
         notes += tuple(Statement("harmful_nuisance", WARNING, name) for name in rejected_names if name not in early)
         if group.engine.has_loop:  # from its start on: until it is done, the fit with all of them is the best so far
             progress = progress.aside(f"once more without {', '.join(lost)}")
-        return self._chosen(replace(self._solve(group, group.problem(kept_names), progress), notes=notes), progress)
+        simpler_solution = self._solve(group, group.problem(kept_names), progress, solution)
+        return self._chosen(replace(simpler_solution, notes=notes), progress)
 
     @property
     def _chooses(self) -> bool:
@@ -318,17 +328,18 @@ class Fit:
         if not self._chooses:
             return solution
         chosen_solution = better_of(solution, self._plain(solution, progress))
-        if trust(chosen_solution.solver, chosen_solution, AUTO).kind != SANDWICH:
+        adds_up = all(name in TRAVELS for name, _ in chosen_solution.solver.problem.columns)  # then no force is taken
+        if adds_up or trust(chosen_solution.solver, chosen_solution, AUTO).kind != SANDWICH:
             return chosen_solution
-        names, inner_progress = (
-            chosen_solution.solver.problem.nuisances,
-            progress.aside("once more with a constant force"),
-        )
+        inner_progress = progress.aside("once more with a constant force")
         try:
-            forced_solutions = [self.beside(chosen_solution, [*names, force], inner_progress) for force in (PUSH, TILT)]
+            names = chosen_solution.solver.problem.nuisances
+            begun_fits = [
+                self.beside(chosen_solution, [*names, force], inner_progress, SCREENING_STEPS) for force in (PUSH, TILT)
+            ]
         except UnsupportedError:  # an engine that knows no constant force
             return chosen_solution
-        return best_with_force(chosen_solution, forced_solutions)
+        return best_with_force(chosen_solution, screened(chosen_solution, begun_fits, inner_progress))
 
     def _plain(self, solution: Solution, progress: FitProgress) -> Solution:
         """The fit of the only group without nuisances, but for the gain of a nominal supply; the fit itself where it
@@ -340,10 +351,16 @@ class Fit:
         kept_names = [name for name in names if name == GAIN]
         return self.beside(solution, kept_names, progress.aside(f"once more without {', '.join(lost)}"))
 
-    def beside(self, base_solution: Solution, nuisances: Sequence[str], progress: FitProgress) -> Solution:
-        """The fit of the only group with these nuisances, in the rows of another fit."""
+    def beside(
+        self,
+        base_solution: Solution,
+        nuisances: Sequence[str],
+        progress: FitProgress,
+        limit: int = MAX_ITERATIONS,
+    ) -> Solution:
+        """The fit of the only group with these nuisances, in the rows of another fit. limit: of its steps."""
         problem = replace(self.groups[0].problem(nuisances), pieces=base_solution.solver.problem.pieces)
-        return self._solve(self.groups[0], problem, progress, base_solution)
+        return self._solve(self.groups[0], problem, progress, base_solution, limit)
 
     def _with_latencies_only(self, solution: Solution, progress: FitProgress) -> Solution | None:
         """The fit of one group without other automatic nuisances; None where there are none, or they were asked for.
@@ -355,34 +372,28 @@ class Fit:
         if not lost or len(self.groups) != 1 or self.question.nuisances is not None:
             return None
         group = self.groups[0]
-        simpler_solution = self._solve(group, group.problem([name for name in names if name not in lost]), progress)
+        simpler_problem = group.problem([name for name in names if name not in lost])
+        simpler_solution = self._solve(group, simpler_problem, progress, solution)
         note = Statement("unsettled_nuisances", WARNING, numbers={"nuisances": tuple(lost)})
         return replace(simpler_solution, notes=(*solution.notes, note))
 
     def _solve(
-        self, group: Group, problem: Problem, progress: FitProgress, base_solution: Solution | None = None
+        self,
+        group: Group,
+        problem: Problem,
+        progress: FitProgress,
+        base_solution: Solution | None = None,
+        limit: int = MAX_ITERATIONS,
     ) -> Solution:
-        """The best point of one group alone. base_solution: a fit of it with other nuisances, near which an engine that
-        marches by steps begins."""
+        """The best point of one group alone. base_solution: a fit of it with other nuisances, at whose end an engine
+        that marches by steps begins, and takes at most `limit` steps."""
         if group.engine.has_loop:
             return solve_loop(problem, self.nu, progress)
-        engine = group.engine.of(problem, FINE_TOLERANCE)
-        if group.engine.exact:
-            progress.enter("looking for a start")
-            solver = Solver(problem, engine, self.nu)
-            return solver.minimise(first_point(solver, group.records), progress=progress)
-        coarse_state = coarse_point(problem, self.nu, progress, base_solution)
-        coarse_solver = Solver(problem, group.engine.of(problem, HALFWAY_TOLERANCE), self.nu, KINK_PRECISION)
-        scales = (
-            coarse_state.variance if self.nu else None
-        )  # counts find theirs anew: a step a row is too coarse for them
-        nearer_solution = coarse_solver.minimise(coarse_state.point, progress=progress, scales=scales)
-        return Solver(problem, engine, self.nu, FIT_PRECISION).minimise(
-            nearer_solution.state.point,
-            progress=progress,
-            blocked_parameters=nearer_solution.blocked_parameters,
-            scales=nearer_solution.state.variance,
-        )
+        if not group.engine.exact:
+            return solve_by_steps(problem, group.engine, self.nu, progress, base_solution, limit)
+        progress.enter("looking for a start")
+        solver = Solver(problem, group.engine.of(problem, FINE_TOLERANCE), self.nu)
+        return solver.minimise(first_point(solver, group.records), progress=progress)
 
     def _settled_alone(self, progress: FitProgress) -> tuple[str, ...] | None:
         """The automatic nuisances that every group supports alone; None where they are not automatic, or all stay."""
@@ -433,7 +444,8 @@ class Fit:
             kind = self.groups[0].engine
             return Solver(problems[0], kind.of(problems[0], LOOP_FINE if kind.has_loop else tol), self.nu)
         engine = join(self.groups, problems, own_names(self.question.per_free, problems), tol)
-        return Solver(engine.problem, engine, self.nu)
+        by_steps = not any(group.engine.exact or group.engine.has_loop for group in self.groups)
+        return Solver(engine.problem, engine, self.nu, FIT_PRECISION if by_steps else END_PRECISION)
 
     def _so_far(self, best: Best) -> tuple[Solution, list[Statement]]:
         """The best so far as if it were the best, and what is to be said of it."""

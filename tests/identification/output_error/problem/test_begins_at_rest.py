@@ -38,3 +38,15 @@ def test_a_log_that_begins_at_rest(volts):
 def test_a_robot_that_turns_round_under_its_voltage_does_not_begin_at_rest(rows, reach):
     """Its speed is 0 in the mean: from -v to v, v as many times the noise."""
     assert share_at_rest(np.linspace(-reach, reach, rows) * NOISE, 1.0) == 0.0
+
+
+@pytest.mark.parametrize(("speed", "rests"), [(0.0, True), (2.0, False)])
+def test_wheels_that_stand_still_tell_more_than_a_gyroscope_with_a_bias(speed, rests):
+    """A bias of a standard deviation shows in 50 rows; wheels at 2 rad/s do move."""
+    rng = np.random.default_rng(0)
+    twist = np.full((ROWS, 3), np.nan)
+    twist[:, 2] = 0.01 + 0.01 * rng.normal(size=ROWS)
+    t = 0.01 * np.arange(ROWS)
+    angle = np.floor(np.outer(t, [speed] * 3) / 0.005) * 0.005
+    log = record(Run(t=t, voltage=np.zeros((ROWS, 3)), twist=twist, wheel_angle=angle), AXEBOT)
+    assert (not pieces([log], AXEBOT, AUTO, has_latency=False)[0].free[:3].any()) == rests

@@ -82,7 +82,7 @@ class Downhill:
     def distance_without(self, still):
         return 100.0
 
-    def moved(self, damping, still, bend, onto):
+    def moved(self, damping, still, bend, onto, share):
         return self.point
 
 

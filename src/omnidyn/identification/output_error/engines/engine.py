@@ -80,6 +80,10 @@ class Engine(Generic[P]):
             for piece, parts in zip(self.problem.pieces, self.parts(point), strict=True)
         ]
 
+    def bent(self, inner: FloatArray, step: FloatArray) -> FloatArray:
+        """The step (P,) of the numbers that the solver sees, along a valley that the engine knows to be curved."""
+        return step
+
     @property
     def unfiltered(self) -> Engine[P]:
         """The engine that simulates, whose rows are as they are."""

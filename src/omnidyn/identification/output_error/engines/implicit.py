@@ -19,9 +19,11 @@ from omnidyn.compiled.parallel import side_by_side
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX, Engine, driver_of, late_by
 from omnidyn.identification.output_error.engines.exact import HEADING, POSITION, PUSH, TILT
+from omnidyn.identification.output_error.engines.valley import bent
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
 from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
+from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
 from omnidyn.model.known.told import holding
 from omnidyn.model.layout import N_AXES
@@ -36,11 +38,45 @@ from omnidyn.simulation.sensitivity.late_sample import (
 )
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
 from omnidyn.simulation.way import PATH, PLACE, TURN
+from omnidyn.statistics import difference_noise
 
-PATH_TOLERANCE = 1e-6  # [m/s] where a path is fitted: what a speed is off by adds up, to a tick of an encoder in 10 s
+PATH_TOLERANCES = (1e-6, 1e-4)  # [m/s] where a path is fitted, and what a speed is off by adds up
+PATH_SHARE = 0.05  # standard errors that the tolerance may move a fit by
+PATH_ERROR = 2.5e-3  # [sqrt(s)] error of a path after a time T over tol sqrt(T), measured
+SPEED_TOLERANCE = 1e-5  # [m/s] that is asked for at the end of a fit to speeds; a path has that much more or less
 STEPS = 2  # a row, of derivatives at the end of a fit; it begins with one
 LEAST_TOL = 1e-5  # [m/s] of the run itself
 Shown = tuple[FloatArray, FloatArray, FloatArray]  # value (rows, m), its time derivative (rows, m), (rows, K, m)
+
+
+def path_tolerance(problem: Problem) -> float:
+    """The tolerance [m/s] at which a run is off by so much less than the noise of its angles and positions that a fit
+    to all rows of it moves by no more than PATH_SHARE standard errors."""
+    longest = max(float(piece.record.t[piece.last] - piece.record.t[piece.first]) for piece in problem.pieces)
+    finest, rows = np.inf, 0
+    for record in {id(piece.record): piece.record for piece in problem.pieces}.values():
+        for c, (name, _) in enumerate(record.columns):
+            if name in TRAVELS:
+                rows += int(np.isfinite(record.outputs[:, c]).sum())
+                finest = min(finest, _reach(name, problem.robot) * _noise(record, c))
+    tol = PATH_SHARE * finest / (PATH_ERROR * np.sqrt(max(rows, 1) * max(longest, 1.0)))
+    return float(np.clip(tol, *PATH_TOLERANCES))
+
+
+def _reach(name: str, robot: Robot) -> float:
+    """The way at the rim of a wheel [m] for each unit of an output that adds up."""
+    if name == POSITION:
+        return 1.0
+    return float(np.mean(robot.wheels.radii if name == "wheel_angle" else robot.wheels.robot_radius))
+
+
+def _noise(record: Record, c: int) -> float:
+    """Standard deviation of the noise of a column: rounding of counts, else from its second differences, in which a
+    motion hardly shows."""
+    if record.ticks[c]:
+        return record.ticks[c] / np.sqrt(12.0)
+    values = record.outputs[:, c]
+    return difference_noise(np.diff(values[np.isfinite(values)])) / np.sqrt(3.0)
 
 
 class LastPoints:
@@ -76,10 +112,12 @@ class ImplicitEngine(Engine[Problem]):
 
     @classmethod
     def of(cls, problem: Problem, tol: float | None = None) -> ImplicitEngine:
-        """The engine of wheels that roll, or of wheels that may slip. tol [m/s]: finer where a path is fitted."""
-        travels = any(name in TRAVELS for name, _ in problem.columns)
+        """The engine of wheels that roll, or of wheels that may slip. tol [m/s]: where a path is fitted, as much finer
+        as its sensors ask for."""
         kind = ImplicitEngine if problem.robot.wheels.traction_mu is None else SlipEngine
-        return kind(problem, tol if tol is None or not travels else min(tol, PATH_TOLERANCE))
+        if tol is None or not any(name in TRAVELS for name, _ in problem.columns):
+            return kind(problem, tol)
+        return kind(problem, min(tol * path_tolerance(problem) / SPEED_TOLERANCE, max(tol, PATH_TOLERANCES[1])))
 
     def __init__(self, problem: Problem, tol: float | None = None):
         self.problem, self.tol = problem, tol
@@ -108,6 +146,10 @@ class ImplicitEngine(Engine[Problem]):
         engine = copy.copy(self)
         engine.problem, engine.last = problem, LastPoints()
         return engine
+
+    def bent(self, inner: FloatArray, step: FloatArray) -> FloatArray:
+        """The step of a fit along the valley in which motors and viscous friction go together, see `valley.py`."""
+        return bent(self.problem, inner, step)
 
     def residuals(self, point: Point) -> list[Parts]:
         """(residuals, slopes, at) of every piece, see `_piece`; those of `last` are not simulated again."""

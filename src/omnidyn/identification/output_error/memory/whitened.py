@@ -37,11 +37,16 @@ class WhitenedEngine(Engine[Problem]):
         moves: Sequence[BoolArray] | None = None,
     ):
         self.engine, self.models, self.problem, self._moves = engine, dict(models), engine.problem, moves
+        self.tol = engine.tol
 
     @property
     def unfiltered(self) -> Engine[Problem]:
         """The engine that simulates, whose rows are as they are."""
         return self.engine
+
+    def bent(self, inner: FloatArray, step: FloatArray) -> FloatArray:
+        """A step of a fit as the engine that simulates bends it."""
+        return self.engine.bent(inner, step)
 
     def on(self, problem: Problem) -> WhitenedEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
@@ -109,6 +114,10 @@ class NearEngine(Engine[Problem]):
         self.problem, self._cheap = exact_engine.problem, fast_engine
         pairs = zip(exact_engine.residuals(point), fast_engine.residuals(point), strict=True)
         self._off = [(np.nan_to_num(a[0] - b[0]), np.nan_to_num(a[1] - b[1])) for a, b in pairs]
+
+    def bent(self, inner: FloatArray, step: FloatArray) -> FloatArray:
+        """A step of a fit as the engine that simulates bends it."""
+        return self._cheap.bent(inner, step)
 
     def residuals(self, point: Point) -> list[Parts]:
         """Residuals and slopes of every piece, see engines/engine.py."""

@@ -44,7 +44,8 @@ from omnidyn.identification.output_error.memory.whitened import (
     spacing,
 )
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
-from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, of_states
+from omnidyn.identification.output_error.solve.normal_equations import of_states
+from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, WHITE, Trust, trust
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.statement import NOTE, WARNING, Statement

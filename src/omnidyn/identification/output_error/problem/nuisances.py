@@ -23,7 +23,7 @@ from omnidyn.identification.methods import AUTO, REST
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.identification.output_error.problem.record import Record
-from omnidyn.identification.output_error.problem.starts import measured_twist
+from omnidyn.identification.output_error.problem.starts import measured_twist, measured_twists
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN
 from omnidyn.model.first_guess import GRAVITY
 from omnidyn.model.frames import AXES
@@ -176,24 +176,34 @@ def pieces(
     """
     result = []
     for record in records:
-        twist = measured_twist(record, robot)
+        twists = [*measured_twists(record, robot)]
         for number, (first, last) in enumerate(record.pieces):
             is_at_rest = start == REST and number == 0
-            result.append(_piece(record, twist, first, last, is_at_rest, start == AUTO, has_latency))
-            if twist is not None and start_std is not None:
+            result.append(_piece(record, twists, first, last, is_at_rest, start == AUTO, has_latency))
+            if twists and start_std is not None:
                 result[-1] = replace(result[-1], start_std=start_std)
     return result
 
 
 def _piece(
-    record: Record, twist: FloatArray | None, first: int, last: int, is_at_rest: bool, decide: bool, has_latency: bool
+    record: Record,
+    twists: Sequence[FloatArray],
+    first: int,
+    last: int,
+    is_at_rest: bool,
+    decide: bool,
+    has_latency: bool,
 ) -> Piece:
+    """Rows first..last. twists: as each channel tells it, (rows, 3) each; of rest tells the first that sees all axes: a
+    gyroscope alone has a bias, and wheels that stand still tell more."""
+    twist = twists[0] if twists else None
+    whole_twist = next((each for each in twists if np.isfinite(each).any(axis=0).all()), twist)
     columns = record.columns
     travels = np.array([name in TRAVELS for name, _ in columns])
     rows = slice(first, min(first + LEAD, last + 1))
     guess = np.zeros(3) if twist is None else np.array([_mean(twist[rows, axis]) for axis in range(3)])
     if decide:
-        is_at_rest = _begins_at_rest(record, twist, first, last)
+        is_at_rest = _begins_at_rest(record, whole_twist, first, last)
     offset = np.array([_mean(record.outputs[rows, c]) if travels[c] else 0.0 for c in range(len(columns))])
     duration = float(record.t[last] - record.t[first])
     margin = min(MOST_LATENCY, 0.1 * duration) if has_latency and not is_at_rest else 0.0

@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.problem.problem import Parts, Piece, Po
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import friction_values, integral_start
 from omnidyn.identification.output_error.solve.progress import FitProgress
-from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
+from omnidyn.identification.output_error.solve.solver import NEAR_PRECISION, Solution, Solver, State
 from omnidyn.model.keys import FRICTION, find_key
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.sensitivity.late_sample import Direction
@@ -28,8 +28,7 @@ MANY_ROWS = 100_000  # rows to which a long log is first fitted
 FEW_ROWS = 1500  # the same for the implicit engine
 LATENCIES = 500  # steps for their median
 FRICTION_SHARES = (0.3, 0.1, 0.03)  # shares of its friction with which a robot may move as the log does
-NEAR_PRECISION = 0.1  # squared distance to the best point, in standard errors, that is near
-BIAS = 1e-4  # the same per row: what a step a row is off by does not shrink with the rows
+BIAS = 1e-2  # of that squared distance, per row: what a step a row is off by does not shrink with the rows
 
 
 def first_point(solver: Solver, records: Sequence[Record]) -> State:
@@ -82,45 +81,44 @@ def _with_latencies(solver: Solver, start_state: State) -> State:
     return solver.state(Point(values, point.states))
 
 
-def coarse_point(problem: Problem, nu: float, progress: FitProgress, base_solution: Solution | None = None) -> State:
-    """A state near the best point, by a step a row; a long log is first fitted in part. base_solution: a fit of the
-    same pieces with other nuisances, near which it begins."""
+def point_of(base_solution: Solution, problem: Problem) -> Point:
+    """Where a fit ended, as a point of a problem with other nuisances on the same pieces."""
+    values = dict(zip(base_solution.solver.problem.names, base_solution.state.point.values.tolist(), strict=True))
+    return Point(np.array([values.get(p.name, p.value) for p in problem.parameters]), base_solution.state.point.states)
+
+
+def coarse_point(problem: Problem, nu: float, progress: FitProgress) -> State:
+    """A state near the best point, by a step a row; a long log is first fitted in part."""
     progress.enter("looking for a start")
-    rows = sum(piece.last - piece.first for piece in problem.pieces)
-    solver = Solver(problem, ImplicitEngine.of(problem), nu, max(NEAR_PRECISION, BIAS * rows))
-    if base_solution is not None:
-        values = dict(zip(base_solution.solver.problem.names, base_solution.state.point.values.tolist(), strict=True))
-        near_point = Point(
-            np.array([values.get(p.name, p.value) for p in problem.parameters]), base_solution.state.point.states
-        )
-        return solver.minimise(near_point, progress=progress).state
+    solver = _by_row(problem, nu)
     short, start_point = problem.shortened(FEW_ROWS), moving_start(problem, nu, progress)
     if short is problem:
         return solver.minimise(start_point, progress=progress).state
     short_point = (
-        Solver(short, ImplicitEngine.of(short), nu, NEAR_PRECISION)
-        .minimise(start_point, progress=progress.aside("a part of the log first"))
-        .state.point
+        _by_row(short, nu).minimise(start_point, progress=progress.aside("a part of the log first")).state.point
     )
     states = [solver.state(point) for point in (start_point, short_point)]
     return solver.minimise(min(states, key=lambda state: state.objective).point, progress=progress).state
 
 
-def _timed(problem: Problem, point: Point, nu: float, progress: FitProgress) -> Point:
-    """The point with the latencies that go with motors near their own.
+def _by_row(problem: Problem, nu: float) -> Solver[Problem]:
+    """The solver by a step a row: too coarse for counts, which are taken like any other output."""
+    return Solver(problem, ImplicitEngine.of(problem), nu, _precision(problem), counts_ticks=False)
+
+
+def _precision(problem: Problem) -> float:
+    """Squared distance to the best point of a step a row, in standard errors, that is near the best point of all."""
+    return max(NEAR_PRECISION, BIAS * sum(piece.last - piece.first for piece in problem.pieces))
+
+
+def _motors_first(problem: Problem, point: Point, nu: float, progress: FitProgress) -> State:
+    """The state near the best point with every latency at its start.
 
     The latency of a current meets a jump at every row: a motor that is a wrong guess brings it to the wrong side of it,
     and no descent brings it back. Of a path, half the force a tenth of a second earlier looks like the whole one: a
-    valley that ends in another minimum. So motors come first, with every latency at its start.
+    valley that ends in another minimum. So motors come first.
     """
-    parts = {p.part for p in problem.parameters}
-    if LATENCY not in parts or (MOTOR not in parts and problem.where(CURRENTS) < 0):
-        return point
-    held_problem = _on_time(problem)
-    first = Solver(held_problem, ImplicitEngine.of(held_problem), nu, NEAR_PRECISION).minimise(
-        point, progress=progress.aside("motors first")
-    )
-    return _with_latencies(Solver(problem, ImplicitEngine.of(problem), nu), first.state).point
+    return _by_row(_on_time(problem), nu).minimise(point, progress=progress.aside("motors first")).state
 
 
 def _on_time(problem: Problem) -> Problem:
@@ -164,7 +162,7 @@ def _by_rates(problem: Problem, point: Point, nu: float, progress: FitProgress) 
     than their path, so that the better one of both is taken.
     """
     held_problem = _on_time(problem)
-    solver = Solver(held_problem, RateEngine(held_problem), nu, NEAR_PRECISION, counts_ticks=False)
+    solver = Solver(held_problem, RateEngine(held_problem), nu, _precision(problem), counts_ticks=False)
     rate_point = solver.minimise(point, progress=progress.aside("rates before paths")).state.point
     return Point(rate_point.values, point.states)
 
@@ -184,9 +182,7 @@ def _levels_first(problem: Problem, point: Point, nu: float, progress: FitProgre
     )
     first = replace(problem, parameters=held_parameters)
     inner_progress = progress.aside("levels of friction first")
-    return (
-        Solver(first, ImplicitEngine.of(first), nu, NEAR_PRECISION).minimise(point, progress=inner_progress).state.point
-    )
+    return _by_row(first, nu).minimise(point, progress=inner_progress).state.point
 
 
 def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
@@ -195,7 +191,7 @@ def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
     With the latencies that go with it. Where outputs add up, the better one of that and what their rates say.
     """
     start_point, short = problem.start(), problem.shortened(FEW_ROWS)
-    solver = Solver(short, ImplicitEngine.of(short), nu)
+    solver = _by_row(short, nu)
     friction = np.array([p.part == FRICTION for p in problem.parameters], bool)
     points = [
         start_point,
@@ -205,12 +201,12 @@ def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
         ),
     ]
     costs = side_by_side(lambda point: solver.state(point).objective, points)
-    best = points[int(np.argmin(costs))]
-    best = _levels_first(short, best, nu, progress)
-    start_states = [best]
+    best = _levels_first(short, points[int(np.argmin(costs))], nu, progress)
+    start_points = [best]
     if any(name in TRAVELS for name, _ in short.columns):
-        start_states.append(_by_rates(short, best, nu, progress))
-    return min(
-        (_timed(short, start_state, nu, progress) for start_state in start_states),
-        key=lambda point: solver.state(point).objective,
-    )
+        start_points.append(_by_rates(short, best, nu, progress))
+    parts = {p.part for p in problem.parameters}
+    if LATENCY in parts and (MOTOR in parts or problem.where(CURRENTS) >= 0):
+        states = [_motors_first(short, start, nu, progress) for start in start_points]
+        return _with_latencies(solver, min(states, key=lambda state: state.objective)).point
+    return min(start_points, key=lambda start: solver.state(start).objective) if len(start_points) > 1 else best

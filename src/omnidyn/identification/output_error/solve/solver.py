@@ -17,6 +17,13 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.engine import Engine, P, Weighting
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
 from omnidyn.identification.output_error.problem.problem import Fitted, PieceSums, Point, per_column
+from omnidyn.identification.output_error.solve.normal_equations import (
+    SPEED_LIMITS,
+    damped,
+    of_states,
+    solve_balanced,
+    weighted,
+)
 from omnidyn.identification.output_error.solve.steps import Bend, Edges, Order
 from omnidyn.progress import Progress, Report
 from omnidyn.statement import Statement
@@ -24,6 +31,11 @@ from omnidyn.statement import Statement
 MAX_ITERATIONS = 60
 END_PRECISION = 1e-5  # squared distance to the best point, in standard errors, at which it ends
 KINK_PRECISION = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
+NEAR_PRECISION = 10.0  # the same from where a descent goes on by another likelihood, or by shorter steps
+LEAST_STEP = 0.3  # share of a step that is too long: what is less long goes another way
+MOST_RISE = 16.0  # times the squared distance, that F rises by where half of a step may do
+MOST_NEAR_DAMPING = 1e-7  # that holds what rounding made of a step
+SCATTER = 1e-2  # of F by an engine that marches by steps: a difference below it says nothing, but a gradient does
 CREEP, STEPS = 3.0, 2  # times `close`, that so many steps in a row each lower F by less than: they creep along a kink
 BEND_DISTANCE = (
     100.0  # squared distance to the best point, in standard errors, beyond which a bend is not that of the end
@@ -34,11 +46,7 @@ FIRM_DAMPING, SHORT_DAMPING = (
     10.0,
 )  # least damping after a step that failed; that of a step with what was blocked at an edge
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
-NO_INFORMATION = 1e-100  # information on the start of a piece that is none: divided by it, nothing is finite
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
-
-
-SPEED_LIMITS = np.array([30.0, 30.0, 300.0])  # [m/s, m/s, rad/s] no robot sets off faster; a step astray would not end
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +79,18 @@ class Solution:
     notes: tuple[Statement, ...] = ()
     plain_solution: Solution | None = None
 
+    @property
+    def least_objective(self) -> float:
+        """F at the best point, as far as it is seen from here."""
+        return self.state.objective - 0.5 * Normal(self.solver, self.state).distance_without(self.held_parameters)
+
+    def gone_on(self, progress: Progress | None = None) -> Solution:
+        """The same with as many steps as it takes."""
+        if self.converged:
+            return self
+        scales = self.state.variance if self.solver.scaled.any() else None
+        return self.solver.minimise(self.state, MAX_ITERATIONS, progress, self.blocked_parameters, scales)
+
 
 class Solver(Generic[P]):
     """Minimises F over a problem. `floor` (columns,): least variance of each column.
@@ -88,9 +108,9 @@ class Solver(Generic[P]):
         counts_ticks: bool = True,
     ):
         self.problem, self.engine, self.nu, self.close, self.counted = problem, engine, nu, precision, counts_ticks
-        self.creep = (
-            CREEP * precision if precision > END_PRECISION else 0.0
-        )  # a speed loop may creep for long, and yet find its way
+        is_exact = precision <= END_PRECISION  # or a speed loop, which may creep for long, and yet find its way
+        self.creep, self._scatter = (0.0, 0.0) if is_exact else (max(CREEP * precision, 2.0 * SCATTER), SCATTER)
+        self._kink = max(KINK_PRECISION, precision, 2.0 * self._scatter)  # F would change by less than it scatters
         self.tick = problem.tick if counts_ticks else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
         self._edges, self.order = Edges(problem), Order(problem)
@@ -139,9 +159,9 @@ class Solver(Generic[P]):
             return self._descend(
                 self._rescaled(self.state(self._inside(start), scales))[0], limit, progress, blocked_parameters
             )
-        plain_solution = Solver(self.problem, self.engine, precision=self.close, counts_ticks=False).minimise(
-            start, limit
-        )
+        precision = max(self.close, NEAR_PRECISION) if self._scatter else self.close
+        plain_solver = Solver(self.problem, self.engine, precision=precision, counts_ticks=False)
+        plain_solution = plain_solver.minimise(start, limit, blocked_parameters=blocked_parameters)
         start_state = self.state(
             plain_solution.state.point, np.maximum(plain_solution.state.variance - self.tick**2 / 12.0, self.floor)
         )
@@ -156,28 +176,41 @@ class Solver(Generic[P]):
             held_parameters if blocked_parameters is None else blocked_parameters,
             Bend(len(held_parameters)),
         )
-        is_released, slow_steps = False, 0
+        is_released, slow_steps, share, near_damping = False, 0, 1.0, 0.0
         for iteration in range(limit):
             normal, objective_before = Normal(self, state), state.objective
-            held_parameters, is_better = normal.held, False
-            if not self.scaled.any():  # a scale that is held meanwhile would be taken for a bend
+            held_parameters, is_better, is_halved = normal.held, False, False
+            if not self.scaled.any() and not self._scatter:  # a scale that is held meanwhile, or scatter, is no bend
                 bend.learn(normal.inner, normal.gradient, normal.information)
             still_parameters, shift = held_parameters | blocked_parameters, np.zeros(len(held_parameters))
+            is_near = normal.distance_without(still_parameters) < BEND_DISTANCE
+            if self._scatter and self.engine.tol and damping < FIRM_DAMPING and is_near:
+                damping = near_damping  # what numbers go together by is known by priors alone: much would hold it
             while not is_better and (distance := normal.distance_without(still_parameters)) / (1.0 + damping) > (
-                self.close if damping < FIRM_DAMPING else max(KINK_PRECISION, self.close)
+                self.close if damping < FIRM_DAMPING else self._kink
             ):
                 if distance > BEND_DISTANCE:
                     bend.forget()
                 moved_point = normal.moved(
-                    damping, still_parameters, bend.beside(normal.information, still_parameters), shift
+                    damping, still_parameters, bend.beside(normal.information, still_parameters), shift, share
                 )
                 trial = self.state(moved_point, state.variance if self.scaled.any() else None)
-                is_better = trial.objective < state.objective
+                is_better = trial.objective < state.objective or self._is_nearer(
+                    trial, state, distance, still_parameters
+                )
+                if not is_better and damping == near_damping and share * distance > self._kink:
+                    is_wild = trial.objective - state.objective >= MOST_RISE * distance  # a way that rounding made
+                    if is_wild and damping < MOST_NEAR_DAMPING:
+                        damping = near_damping = min(max(100.0 * damping, LEAST_DAMPING), MOST_NEAR_DAMPING)
+                        continue
+                    if share > LEAST_STEP:  # a valley: shorter, but the same way
+                        share, is_halved = 0.5 * share, True
+                        continue
                 edge = None if is_better else self._edges.not_yet(still_parameters)
                 if edge is not None:  # once more, and from here on, without what may stand at a jump or a kink
                     shift = self._edges.onto(normal.inner, self.inner(moved_point.values), still_parameters | ~edge)
                     blocked_parameters = blocked_parameters | edge
-                    still_parameters = still_parameters | blocked_parameters
+                    still_parameters, share = still_parameters | blocked_parameters, 1.0
                     continue
                 if not is_better and shift.any():  # what was a guess is dropped before steps get shorter
                     shift = np.zeros(len(held_parameters))
@@ -185,7 +218,13 @@ class Solver(Generic[P]):
                 if not is_better and bend.known:
                     bend.forget()
                     continue
-                damping = max(damping / 10.0, LEAST_DAMPING) if is_better else max(damping * 10.0, FIRM_DAMPING)
+                share = 1.0 if not is_better else share if is_halved else min(2.0 * share, 1.0)
+                change_of_damping = 100.0 if self._scatter and (damping >= FIRM_DAMPING or not is_better) else 10.0
+                damping = (
+                    max(damping / change_of_damping, LEAST_DAMPING)
+                    if is_better
+                    else max(damping * change_of_damping, FIRM_DAMPING)
+                )
                 state = trial if is_better else state
             slow_steps = slow_steps + 1 if is_better and objective_before - state.objective < self.creep else 0
             if self.scaled.any():
@@ -201,6 +240,15 @@ class Solver(Generic[P]):
             elif not is_better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
                 return Solution(state, held_parameters, iteration + 1, True, self, blocked_parameters)
         return Solution(state, held_parameters, limit, False, self, blocked_parameters)
+
+    def _is_nearer(self, trial: State, state: State, distance: float, still_parameters: BoolArray) -> bool:
+        """Whether a trial is nearer to the best point by its gradient, where F changes by less than it scatters.
+
+        distance: that of `state`, squared, in standard errors.
+        """
+        if not max(0.5 * distance, trial.objective - state.objective) < self._scatter:
+            return False
+        return Normal(self, trial).distance_without(still_parameters) < 0.25 * distance
 
     def _rescaled(self, state: State) -> tuple[State, float]:
         """The same point at better scales of Student's t and counts, and the largest relative change.
@@ -268,7 +316,7 @@ class Normal:
         self.solver, self.state, count = solver, state, len(problem.parameters)
         self.scale = np.array([p.slope(float(v)) for p, v in zip(problem.parameters, state.point.values, strict=True)])
         self.pieces = [
-            _weighted(sums, 1.0 / state.variance[sums.columns], self.scale, states, piece.start_prior(states))
+            weighted(sums, 1.0 / state.variance[sums.columns], self.scale, states, piece.start_prior(states))
             for sums, states, piece in zip(state.sums, state.point.states, problem.pieces, strict=True)
         ]
         self._count = count
@@ -290,7 +338,7 @@ class Normal:
         gradient, information = self.prior_gradient.copy(), np.diag(self.prior_information)
         for grad, info in self.pieces:
             k = self._count
-            damped_information = _damped(info, damping)
+            damped_information = damped(info, damping)
             gradient += grad[:k]
             information = information + damped_information[:k, :k]
             if grad.shape[0] > k:
@@ -304,7 +352,7 @@ class Normal:
         `still_parameters`."""
         free, fold = ~still_parameters, self.solver.order.together(self.inner, still_parameters)
         gradient = fold.T @ self.gradient
-        step = _solve((fold.T @ self.information @ fold)[np.ix_(free, free)], gradient[free])
+        step = solve_balanced((fold.T @ self.information @ fold)[np.ix_(free, free)], gradient[free])
         total = float(step @ gradient[free])
         for grad, info in self.pieces:  # what the states alone would gain
             if grad.shape[0] > self._count:
@@ -323,85 +371,30 @@ class Normal:
             block_scores.append(block_score)
         return np.concatenate(block_scores)
 
-    def moved(self, damping: float, still_parameters: BoolArray, bend: FloatArray, onto: FloatArray) -> Point:
+    def moved(
+        self, damping: float, still_parameters: BoolArray, bend: FloatArray, onto: FloatArray, share: float = 1.0
+    ) -> Point:
         """The point of the damped step, within the bounds, without the parameters that are `still_parameters`.
 
-        bend (P, P): what the information lacks, see `Bend`. onto (P,): the step of these, see `Edges`.
+        bend (P, P): what the information lacks, see `Bend`. onto (P,): the step of these, see `Edges`. share: of the
+        whole step that is taken.
         """
         gradient, information = self._reduced(damping)
         free, fold = ~still_parameters, self.solver.order.together(self.inner, still_parameters)
         gradient, information = fold.T @ gradient, fold.T @ (information + bend) @ fold
         step = np.where(still_parameters, onto, 0.0)
-        step[free] = _solve(information[np.ix_(free, free)], (gradient - information @ step)[free])
-        inner_values = self.solver.clipped(self.inner + fold @ step)
+        step[free] = solve_balanced(information[np.ix_(free, free)], (gradient - information @ step)[free])
+        inner_values = self.solver.clipped(self.inner + self.solver.engine.bent(self.inner, share * (fold @ step)))
         step = inner_values - self.inner
         k, states = self._count, []
         for (grad, info), old in zip(self.pieces, self.state.point.states, strict=True):
             new = old.copy()
             if grad.shape[0] > k:
-                damped_information = _damped(info, damping)
-                new += of_states(damped_information[k:, k:], grad[k:] - damped_information[k:, :k] @ step)
+                damped_information = damped(info, damping)
+                new += of_states(damped_information[k:, k:], share * grad[k:] - damped_information[k:, :k] @ step)
                 new[: len(SPEED_LIMITS)] = np.clip(new[: len(SPEED_LIMITS)], -SPEED_LIMITS, SPEED_LIMITS)
             states.append(new)
         return Point(self.solver.outer(inner_values), tuple(states))
-
-
-def of_states(information: FloatArray, right: FloatArray) -> FloatArray:
-    """information^-1 right for the start of a piece; a state that no row tells of stays where it is.
-
-    Such is the speed of a motor that sticks from the start, or whose outputs are missing until it has stopped.
-    """
-    try:
-        return np.asarray(np.linalg.solve(information, right), dtype=float)
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.pinv(information, hermitian=True) @ right, dtype=float)
-
-
-def _weighted(
-    sums: PieceSums,
-    weight: FloatArray,
-    scale: FloatArray,
-    states: FloatArray,
-    start_prior: tuple[FloatArray, FloatArray],
-) -> tuple[FloatArray, FloatArray]:
-    """Gradient and information of a piece over its columns, in inner numbers. start_prior: of its start, see
-    `start_prior`.
-
-    States that are not free do not move. Nor does a speed that the rows only know to be below the fastest (a robot may
-    forget its start before the first row that is used), or that they would pull beyond it.
-    """
-    count = len(scale)
-    full = np.concatenate([scale, np.ones(sums.grad.shape[1] - count)])
-    grad = (weight @ sums.grad) * full
-    info = np.tensordot(weight, sums.info, 1) * np.outer(full, full)
-    start = np.arange(count, count + len(start_prior[0]))
-    grad[start] += start_prior[0]
-    info[start, start] += start_prior[1]
-    state_information = info.diagonal()[count:]
-    if not state_information.max(initial=0.0) > NO_INFORMATION:
-        return grad[:count], info[:count, :count]
-    unseen_states = state_information <= NO_INFORMATION
-    unseen_states[: len(SPEED_LIMITS)] |= state_information[: len(SPEED_LIMITS)] < SPEED_LIMITS**-2
-    speeds, pull = states[: len(SPEED_LIMITS)], grad[count : count + len(SPEED_LIMITS)]
-    unseen_states[: len(SPEED_LIMITS)] |= (np.abs(speeds) >= SPEED_LIMITS) & (np.sign(speeds) * pull > 0.0)
-    state_indices = np.flatnonzero(unseen_states) + count
-    grad[state_indices], info[state_indices, :], info[:, state_indices] = 0.0, 0.0, 0.0
-    info[state_indices, state_indices] = 1.0
-    return grad, info
-
-
-def _damped(info: FloatArray, damping: float) -> FloatArray:
-    return info + np.diag(damping * info.diagonal()) if damping else info
-
-
-def _solve(information: FloatArray, gradient: FloatArray) -> FloatArray:
-    """information^-1 gradient in balanced units; directions that the data do not see stay where they are."""
-    size = np.sqrt(np.maximum(information.diagonal(), 0.0))
-    size[size == 0.0] = 1.0
-    values, vectors = np.linalg.eigh(information / np.outer(size, size))
-    seen_values = values > 1e-13 * max(float(values.max(initial=0.0)), 1e-300)
-    inverse = np.where(seen_values, 1.0 / np.where(seen_values, values, 1.0), 0.0)
-    return (vectors @ (inverse * (vectors.T @ (gradient / size)))) / size
 
 
 def _floor(problem: Fitted) -> FloatArray:

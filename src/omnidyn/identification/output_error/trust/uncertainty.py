@@ -28,7 +28,8 @@ from omnidyn.identification.output_error.engines.engine import Weighting
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, LEAST_SHARE, information, rounding
 from omnidyn.identification.output_error.kernel.march import FINAL, WAVES
 from omnidyn.identification.output_error.problem.problem import PieceSums, Problem, per_column
-from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State, of_states
+from omnidyn.identification.output_error.solve.normal_equations import of_states
+from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
 from omnidyn.identification.output_error.trust.cures import Way, blind_ways
 from omnidyn.statistics import t_quantile
 

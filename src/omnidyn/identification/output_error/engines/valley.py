@@ -1,0 +1,54 @@
+"""A step of a fit along the curved valley in which motors that are guesses leave it.
+
+A motion shows what a voltage pushes with, l K_t/(R r), and what brakes, l^2 K_t K_v/(R r^2) + B, not their parts: a
+longer gear with more resistance and less viscous friction moves the same way. Priors alone tell such robots apart. A
+straight step of logarithms leaves that valley: B must fall by what a product of them grows by. So a step is bent until
+push and braking change by as much as their slopes say (the second-order part of geodesic acceleration, of the
+numbers of the robot alone: M. K. Transtrum, J. P. Sethna, arXiv:1201.5885).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.identification.output_error.problem.problem import Problem
+from omnidyn.model.layout import N_AXES
+from omnidyn.model.robot import Robot
+from omnidyn.model.stick_slip.plant import plant
+
+EPS = 1e-5  # change of a number that the solver sees, relative
+RANK = 1e-7  # share of the largest singular value below which a direction shows in none of the sums
+ROUNDS = 3  # of Newton's method: each leaves the square of what was left
+
+
+def bent(problem: Problem, inner: FloatArray, step: FloatArray) -> FloatArray:
+    """The step (P,) from the numbers `inner` (P,) that the solver sees, bent; as it is where it would bend back."""
+    parameters = problem.robot_parameters
+    here, way = inner[: len(parameters)], step[: len(parameters)]
+    if not way.any():
+        return step
+
+    def at(numbers: FloatArray) -> FloatArray:
+        return _sums(problem.robot_at(np.array([p.outer(float(z)) for p, z in zip(parameters, numbers, strict=True)])))
+
+    start, sizes = at(here), EPS * np.maximum(np.abs(here), 1e-3)
+    changes = [at(here + move) - at(here - move) for move in np.diag(sizes)]
+    slopes = np.stack(changes, axis=1) / (2.0 * sizes)
+    back = np.abs(way)[:, None] * np.linalg.pinv(slopes * np.abs(way), rcond=RANK)  # what does not move stays
+    goal, there = start + slopes @ way, here + way
+    for _ in range(ROUNDS):
+        there = there + back @ (goal - at(there))
+        if not np.all(np.isfinite(there)) or np.any(np.abs(there - here - way) > np.abs(way)):
+            return step
+    return np.concatenate([there - here, step[len(parameters) :]])
+
+
+def _sums(robot: Robot) -> FloatArray:
+    """What the motion shows of motors and viscous friction: force per volt of each wheel, and braking (3, 3)."""
+    body, element = plant(robot)
+    motors, units = element[N_AXES:], np.array([1.0, 1.0, body.length])
+    push, damping = motors["thrust"] / motors["resistance"], element["viscous"].copy()
+    damping[N_AXES:] += push * motors["emf"]
+    braking = (element["g"].T * damping) @ element["g"] * np.outer(units, units)
+    return np.concatenate([push, braking.ravel()])
