@@ -20,8 +20,7 @@ def engine_kind(robot: Robot, command: str, tol: float | None) -> str:
 
     command: what is given. tol [m/s]: of an engine that is not exact, None for one fixed step a row.
     """
-    drive = robot.drive
-    if command == WHEEL_SPEED or (command == DUTY and drive.coasts) or drive.latency > 0.0:
+    if command == WHEEL_SPEED or (command == DUTY and robot.drive.coasts):
         return GENERAL
     if robot.motor.electrical == DYNAMIC:
         return GENERAL

@@ -6,6 +6,7 @@ import numpy as np
 
 from omnidyn.compiled.kernel import inlined, kernel, part
 from omnidyn.simulation.batch.implicit import LAW, TURNING
+from omnidyn.simulation.batch.pose import SHARE
 from omnidyn.simulation.environments.draws import draw, robot_key, uniform
 from omnidyn.simulation.environments.layout import (
     AGAIN,
@@ -216,7 +217,10 @@ def step_blocks(first, last, now, numbers, state, action, buffers):
     taken, acting = np.zeros((len(action), W), dtype), np.zeros((len(action), W), dtype)
     twist, pose = np.zeros(shape, dtype), np.zeros(shape, dtype)
     mean, drive = np.zeros(shape, dtype), np.zeros(shape, dtype)
-    rooms = (twist, pose, mean, drive, acting, np.zeros((6, W), dtype), np.zeros((LAW + TURNING + 1, W), dtype))
+    work = np.zeros((LAW + TURNING + 1, W), dtype)
+    for n in range(W):
+        work[SHARE, n] = 1
+    rooms = (twist, pose, mean, drive, acting, np.zeros((6, W), dtype), work)
     row, reached = np.zeros(W, dtype), np.zeros(W, np.uint8)
     for b in range(first, last):
         take_action(taken, action, b * W)
