@@ -211,7 +211,7 @@ def put_stage(work, to, back, box, k, zero):
 
 
 @inlined
-def _advance_pose(work, k):
+def advance_pose(work, k):
     """The pose after a step, from the speeds at the ends of its stages: `advance_pose` of the scalar engine."""
     late, early, angle = k[LATE], k[EARLY], k[ANGLE]
     x1, y1, w1, x2, y2, w2 = work[NODE], work[NODE + 1], work[NODE + 2], work[END], work[END + 1], work[END + 2]
@@ -272,7 +272,7 @@ def march_implicit(first, last, laws, rows, record, rule):
                 put_stage(work, NODE, zero, rule.box, k, zero)
                 put_stage(work, END, k[BACKWARD], rule.box, k, zero)
                 if count > 3:
-                    _advance_pose(work, k)
+                    advance_pose(work, k)
                 else:
                     for axis in range(3):
                         for n in range(WIDTH):
