@@ -67,6 +67,61 @@ def reaching_volts(robot: Robot, commands: BatchCommands) -> tuple[FloatArray, B
     return reaching(robot, limited), (limited != asked) | beyond
 
 
+def put_states(states: NDArray[Any], block: IntArray, lane: IntArray, twist: FloatArray, pose: FloatArray) -> None:
+    """Put robots into states (blocks, 3 or 9, WIDTH), with poses where these have them."""
+    states[block, :3, lane] = twist
+    if states.shape[1] > 3:
+        states[block, 3:6, lane] = pose
+        states[block, 6, lane], states[block, 7, lane] = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+        states[block, 8, lane] = 0.0
+
+
+def shown(states: NDArray[Any], failed: BoolArray, rows: int, count: int) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Twist and pose, shape (n, 3) each, and whether a robot has failed, shape (n,)."""
+    table, lost = out_of_blocks(states[:, :rows], count).astype(float), failed.reshape(-1)[:count]
+    table[:, lost] = np.nan
+    return table[:3].T, table[3:].T, lost.copy()
+
+
+class Keeping:
+    """What a run of blocks keeps on its way, and which robots are lost from which row on."""
+
+    def __init__(
+        self, states: NDArray[Any], failed: BoolArray, rows: int, steps: int, every: int, statistics: bool
+    ) -> None:
+        blocks, self._steps = len(states), steps
+        history = np.zeros((1 + steps // every if every else 0, rows, blocks * WIDTH), states.dtype)
+        if every:
+            history[0] = states[:, :rows].swapaxes(0, 1).reshape(rows, -1)
+        totals = np.zeros((blocks if statistics else 0, TOTALS * rows, WIDTH))
+        self.fails = np.where(failed, 0, np.iinfo(np.int64).max)
+        self.record = Record(every, history, totals)
+
+    def without_bad(self, rows: FloatArray, first: int, last: int) -> FloatArray:
+        """Rows of commands of some robots, (robots, steps, wheels), zeros in place of what is not finite.
+
+        A robot fails in the row of its first command that is not finite.
+        """
+        finite = np.isfinite(rows)
+        if finite.all():
+            return rows
+        bad: BoolArray = ~np.asarray(finite.all(axis=2), dtype=bool)
+        lost = np.where(bad.any(axis=1), bad.argmax(axis=1), np.iinfo(np.int64).max)
+        flat = self.fails.reshape(-1)[first:last]
+        np.minimum(flat, lost, out=flat)
+        return np.where(bad[:, :, None], 0.0, rows)
+
+    def end(self, states: NDArray[Any], count: int) -> tuple[BoolArray, GroupRun]:
+        """(which robots have failed, (blocks, WIDTH); what the run gives)."""
+        failed = (self.fails < self._steps) | ~np.isfinite(states).all(axis=1)
+        sums = None
+        if len(self.record.totals):
+            sums = out_of_blocks(self.record.totals, count).T
+            sums[failed.reshape(-1)[:count]] = np.nan
+        history = self.record.history[:, :, :count].transpose(2, 0, 1) if self.record.every else None
+        return failed, GroupRun(history, sums)
+
+
 class Delays:
     """The latencies of n robots, and the volts under way to their motors.
 
@@ -183,53 +238,32 @@ class BlockGroup:
         """Put some robots to a twist and a pose, shape (robots, 3) each."""
         block, lane = np.divmod(robots, WIDTH)
         for states in self._states:
-            states[block, :3, lane] = twist
-            if self._pose is not None:
-                states[block, 3:6, lane] = pose
-                states[block, 6, lane], states[block, 7, lane] = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-                states[block, 8, lane] = 0.0
+            put_states(states, block, lane, twist, pose)
         self._fresh[block, lane] = 1
         self._delays.forget(robots)
         self._failed[block, lane] = ~(np.isfinite(twist).all(axis=1) & np.isfinite(pose).all(axis=1))
 
     def state(self) -> tuple[FloatArray, FloatArray, BoolArray]:
         """Twist and pose, shape (n, 3) each, and whether a robot has failed, shape (n,)."""
-        rows = out_of_blocks(self._states[-1, :, : self.rows], self.count).astype(float)
-        failed = self._failed.reshape(-1)[: self.count]
-        rows[:, failed] = np.nan
-        return rows[:3].T, rows[3:].T, failed.copy()
+        return shown(self._states[-1], self._failed, self.rows, self.count)
 
     def run(self, commands: BatchCommands, every: int, statistics: bool, threads: Threads) -> GroupRun:
         """Hold rows of commands, one after the other."""
         steps, blocks = commands.steps, self._laws.shape[1]
-        samples = 1 + steps // every if every else 0
-        history = np.zeros((samples, self.rows, blocks * WIDTH), self._dtype)
-        if every:
-            history[0] = self._states[-1, :, : self.rows].swapaxes(0, 1).reshape(self.rows, -1)
-        totals = np.zeros((blocks if statistics else 0, TOTALS * self.rows, WIDTH))
-        fails = np.where(self._failed, 0, np.iinfo(np.int64).max)
-        record, clipped = Record(every, history, totals), []
+        keeping, clipped = Keeping(self._states[-1], self._failed, self.rows, steps, every, statistics), []
         shared = self._shared_volts(commands, clipped)
 
         def march(span: tuple[int, int]) -> None:
-            volts = self._own_volts(commands, span, fails, clipped) if shared is None else shared
-            self._march(*span, self._laws, Rows(volts, self._states, fails, self._fresh), record, *self._rule)
+            volts = self._own_volts(commands, span, keeping, clipped) if shared is None else shared
+            moving = Rows(volts, self._states, keeping.fails, self._fresh)
+            self._march(*span, self._laws, moving, keeping.record, *self._rule)
 
         size = WIDTH * commands.rows[0].size
         threads.map(march, threads.spans(blocks, blocks if shared is not None else max(1, VOLTS_AT_ONCE // size)))
         self._delays.go_on()
-        self._failed = (fails < steps) | ~np.isfinite(self._states).all(axis=(0, 2))
-        lost = self._failed.reshape(-1)[: self.count]
-        sums = None
-        if statistics:
-            sums = out_of_blocks(totals, self.count).T
-            sums[lost] = np.nan
+        self._failed, run = keeping.end(self._states[-1], self.count)
         count = sum(number for number, _ in clipped)
-        return GroupRun(
-            history[:, :, : self.count].transpose(2, 0, 1) if every else None,
-            sums,
-            (count, min((row for number, row in clipped if number), default=0)),
-        )
+        return run._replace(clipped=(count, min((row for number, row in clipped if number), default=0)))
 
     def _shared_volts(self, commands: BatchCommands, clipped: list[tuple[int, int]]) -> NDArray[Any] | None:
         """The volts that all robots share, shape (1, steps, wheels, 1); None where each has its own."""
@@ -244,7 +278,7 @@ class BlockGroup:
         return np.ascontiguousarray(acting[..., None], self._dtype)
 
     def _own_volts(
-        self, commands: BatchCommands, span: tuple[int, int], fails: IntArray, clipped: list[tuple[int, int]]
+        self, commands: BatchCommands, span: tuple[int, int], keeping: Keeping, clipped: list[tuple[int, int]]
     ) -> NDArray[Any]:
         """The volts of the robots of some blocks, shape (blocks, steps, wheels, WIDTH).
 
@@ -252,13 +286,7 @@ class BlockGroup:
         """
         first, last = span[0] * WIDTH, min(span[1] * WIDTH, self.count)
         rows = np.broadcast_to(commands.rows, (self.count, *commands.rows.shape[1:]))[first:last]
-        finite = np.isfinite(rows)
-        if not finite.all():
-            bad: BoolArray = ~np.asarray(finite.all(axis=2), dtype=bool)
-            lost = np.where(bad.any(axis=1), bad.argmax(axis=1), np.iinfo(np.int64).max)
-            flat = fails.reshape(-1)[first:last]
-            np.minimum(flat, lost, out=flat)
-            rows = np.where(bad[:, :, None], 0.0, rows)
+        rows = keeping.without_bad(rows, first, last)
         volts, places = np.zeros(rows.shape, self._dtype), []
         for robot, index in self._delays.drivers:
             here = index if isinstance(index, slice) else index[(index >= first) & (index < last)] - first

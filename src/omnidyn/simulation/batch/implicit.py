@@ -236,7 +236,7 @@ def advance_pose(work, k):
 
 
 @inlined
-def _put_push(work, wheels, volts, shared):
+def put_push(work, wheels, volts, shared):
     """Fill the drive rows [N, N, N m] from volts (wheels, 1) that all robots share, or (wheels, WIDTH)."""
     for axis in range(3):
         row = work[DRIVE + axis]
@@ -248,6 +248,21 @@ def _put_push(work, wheels, volts, shared):
             else:
                 for n in range(WIDTH):
                     row[n] = u[n] * push[n] if wheel == 0 else row[n] + u[n] * push[n]
+
+
+@inlined
+def step_all(work, box, travels, k, zero):
+    """A step of all, the drive being there."""
+    for n in range(WIDTH):
+        work[NODE, n], work[NODE + 1, n], work[NODE + 2, n] = zero, zero, zero
+    put_stage(work, NODE, zero, box, k, zero)
+    put_stage(work, END, k[BACKWARD], box, k, zero)
+    if travels:
+        advance_pose(work, k)
+    else:
+        for axis in range(3):
+            for n in range(WIDTH):
+                work[SPEED + axis, n] = work[END + axis, n]
 
 
 @kernel
@@ -266,17 +281,8 @@ def march_implicit(first, last, laws, rows, record, rule):
                 if piece > 0:
                     hand_over(tables, kept)
                 work, at = tables[piece], step + piece
-                _put_push(work, wheels, volts[b - first, at] if width > 1 else volts[0, at], width == 1)
-                for n in range(WIDTH):
-                    work[NODE, n], work[NODE + 1, n], work[NODE + 2, n] = zero, zero, zero
-                put_stage(work, NODE, zero, rule.box, k, zero)
-                put_stage(work, END, k[BACKWARD], rule.box, k, zero)
-                if count > 3:
-                    advance_pose(work, k)
-                else:
-                    for axis in range(3):
-                        for n in range(WIDTH):
-                            work[SPEED + axis, n] = work[END + axis, n]
+                put_push(work, wheels, volts[b - first, at] if width > 1 else volts[0, at], width == 1)
+                step_all(work, rule.box, count > 3, k, zero)
                 if step >= failure:
                     spoil(work, count, fails[b], step)
             if step == 0 and pieces > 1:
