@@ -23,13 +23,14 @@ from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from omnidyn.model.robot import Robot
 from tests.support.exported import exact_robot, init_robot
-from tests.support.random_calls import ANY, SLOWEST_MS, VALID, Program, of_fmu, of_step
+from tests.support.random_calls import ANY, VALID, Program, of_fmu, of_step
 
 CALLS, FEWER, VALID_CALLS = (
     scaled(1_000_000, 20_000),
     scaled(100_000, 2000),
     scaled(20_000, 400),
 )  # fewer: of variants, and through Python
+SLOWEST_MS = 10.0  # of one call
 ODD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 0.0, 5e-324, 1e10, 1e5)
 
 

@@ -42,7 +42,7 @@ from omnidyn.run import CHANNELS, Run
 
 SECONDS = float(scaled(60))
 ROOT = Path(__file__).resolve().parents[1]
-SLOW_S, MAX_MB = 2.0, 2048
+SLOW_S, MAX_MB = float(os.environ.get("OMNIDYN_FUZZ_SLOW", "2")), 2048
 START_S = 300.0  # to load the libraries and make the seeds, on a machine that is busy
 HANG_S = float(
     os.environ.get("OMNIDYN_FUZZ_HANG", "60")

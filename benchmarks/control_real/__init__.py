@@ -2,7 +2,7 @@
 
 Every cell is an rms error of 0.5 s and later against the true pose. A cell is lost where a controller has more than
 1.1 times the best of others and more than a difference that counts. `python -m benchmarks.control_real 7 clover` draws
-a fourth plant from seed 7, and drives the clover alone.
+one more plant from seed 7, and drives the clover alone; `... lekiwi` drives that robot alone.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 
 from benchmarks.control_real.paths import FunctionPath, paths
 from benchmarks.control_real.plant import Plant
-from benchmarks.control_real.rivals import DT, FRICTION_SHARE, LQR_GAIN, HandPid, LqrIntegral, to_body
-from benchmarks.control_real.robots import NUMBERS, Numbers, random_numbers, robot_of
+from benchmarks.control_real.rivals import DT, FRICTION_SHARE, LQR_GAIN, HandPid, KinematicPi, LqrIntegral, to_body
+from benchmarks.control_real.robots import NUMBERS, SLOWER, Numbers, random_numbers, robot_of
 from benchmarks.table import Table, machine
 from omnidyn.arrays import FloatArray
 from omnidyn.control.mpc.controller import Mpc
@@ -30,7 +30,8 @@ POSE_NOISE, TWIST_NOISE = np.array([1e-3, 1e-3, 1e-3]), np.array([5e-3, 5e-3, 0.
 CAMERA_RATE, CAMERA_DELAY = 60.0, 0.04  # [Hz], [s]
 JITTER, SKIP, ALLOWED = 2e-3, 0.5, 1.1  # [s], [s], times the best
 COUNTS = (0.05, 0.2)  # [mm], [mrad] a difference that counts
-OURS, RIVALS = ("pid", "mpc"), ("PID + kS", "LQR + I")
+OURS, RIVALS = ("pid", "mpc"), ("PID + kS", "LQR + I", "PI + FF")
+COLUMNS = ("PID", "PID + kS", "LQR + I", "PI + FF", "pid", "mpc")
 
 
 class Instruments:
@@ -97,12 +98,14 @@ def told(robot: Robot, kind: str) -> Robot:
 def makers(name: str, numbers: Numbers, kind: str) -> dict[str, Callable[[Plant], Any]]:
     """Controller -> what makes it for a plant."""
     robot = told(robot_of(name, numbers), kind)
+    ours: dict[str, Callable[[Plant], Any]] = {"pid": lambda plant: Pid(robot), "mpc": lambda plant: Mpc(robot)}
+    if "loop" in numbers:
+        return {"PI + FF": KinematicPi, **ours}
     return {
         "PID": HandPid,
         "PID + kS": lambda plant: HandPid(plant, FRICTION_SHARE),
         "LQR + I": lambda plant: LqrIntegral(plant, LQR_GAIN.get(name, 10.0)),
-        "pid": lambda plant: Pid(robot),
-        "mpc": lambda plant: Mpc(robot),
+        **ours,
     }
 
 
@@ -143,7 +146,7 @@ def lost(cells: dict[str, tuple[float, float, float]]) -> list[tuple[str, str]]:
     """(controller, "mm" or "mrad") where one of ours is beaten."""
     found = []
     for k, unit in enumerate(("mm", "mrad")):
-        best = min(cells[name][k] for name in RIVALS)
+        best = min(cells[name][k] for name in RIVALS if name in cells)
         for name in OURS:
             if cells[name][k] > max(ALLOWED * best, best + COUNTS[k]):
                 found.append((name, unit))
@@ -153,15 +156,14 @@ def lost(cells: dict[str, tuple[float, float, float]]) -> list[tuple[str, str]]:
 
 def table_of(robots: dict[str, Numbers], names: list[str]) -> Table:
     """A row per robot, path and sensors."""
-    controllers = list(makers("axebot", NUMBERS["axebot"], SENSORS[0]))
-    columns = ["robot", "path", "sensors", *controllers, "lost"]
+    columns = ["robot", "path", "sensors", *COLUMNS, "lost"]
     table = Table("control_real: rms of position mm / heading mrad on an independent plant", columns, notes=[machine()])
     count = {name: 0 for name in OURS}
     times: dict[str, list[float]] = {name: [] for name in OURS}
     for robot, numbers in robots.items():
         for name in names:
             for kind in SENSORS:
-                path, plant = paths()[name], Plant(numbers)
+                path, plant = paths(SLOWER.get(robot, 1.0))[name], Plant(numbers)
                 cells = {
                     control: errors(plant, make(plant), path, kind)
                     for control, make in makers(robot, numbers, kind).items()
@@ -171,7 +173,8 @@ def table_of(robots: dict[str, Numbers], names: list[str]) -> Table:
                     count[control] += 1
                 for control in OURS:
                     times[control].append(cells[control][2])
-                words: dict[str, Any] = {control: f"{cell[0]:.2f}/{cell[1]:.2f}" for control, cell in cells.items()}
+                words: dict[str, Any] = {name: "" for name in COLUMNS}
+                words |= {control: f"{cell[0]:.2f}/{cell[1]:.2f}" for control, cell in cells.items()}
                 words["lost"] = ", ".join(f"{control} {unit}" for control, unit in beaten)
                 table.add(robot=robot, path=name, sensors=kind, **words)
     total = 2 * len(table.rows)
@@ -188,13 +191,14 @@ def table_of(robots: dict[str, Numbers], names: list[str]) -> Table:
 
 
 def measure() -> Table:
-    """The three robots on all paths."""
+    """All robots on all paths."""
     return table_of(NUMBERS, list(paths()))
 
 
 def main(arguments: list[str]) -> None:
-    """A seed draws a fourth plant; a word is a path, all by default."""
+    """A seed draws one more plant; a word is a path or a robot, all by default."""
     seeds = [int(word) for word in arguments if word.isdigit()]
-    names = [word for word in arguments if not word.isdigit()] or list(paths())
-    robots = {f"seed {seed}": random_numbers(seed) for seed in seeds} or NUMBERS
-    print(table_of(robots, names).as_text())
+    names = [word for word in arguments if word in paths()] or list(paths())
+    robots = {f"seed {seed}": random_numbers(seed) for seed in seeds}
+    robots |= {word: NUMBERS[word] for word in arguments if word in NUMBERS}
+    print(table_of(robots or NUMBERS, names).as_text())

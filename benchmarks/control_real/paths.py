@@ -87,11 +87,11 @@ def _creep() -> FunctionPath:
     return FunctionPath("creep", total, lambda x: np.stack([np.interp(x, t, poses[:, k]) for k in range(3)], axis=1))
 
 
-def paths() -> dict[str, FunctionPath]:
-    """Name -> path."""
+def paths(slower: float = 1.0) -> dict[str, FunctionPath]:
+    """Name -> path; clover and square take so many times as long."""
     return {
-        "clover": FunctionPath("clover", 12.0, _clover),
-        "square": FunctionPath("square", 16.0, _square),
+        "clover": FunctionPath("clover", 12.0 * slower, lambda t: _clover(t / slower)),
+        "square": FunctionPath("square", 16.0 * slower, lambda t: _square(t / slower)),
         "creep": _creep(),
         "push": FunctionPath("push", 12.0, lambda t: np.zeros((len(t), 3))),
     }

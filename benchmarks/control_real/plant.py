@@ -48,7 +48,7 @@ def advance(state, before, impulse, seconds, volts, push, motors, matrices, axes
         for i in range(wheels):
             rim = directions[0, i] * middle[0] + directions[1, i] * middle[1] + directions[2, i] * middle[2]
             applied = volts[i] * level if duty > 0.0 else min(max(volts[i], -level), level)
-            current = min(max((applied - motors[0, i] * rim) / motors[1, i], -limit), limit)
+            current = min(max((applied - motors[3, i] * rim) / motors[1, i], -limit), limit)
             drawn += abs(current * applied) / level
             for a in range(3):
                 force[a] += directions[a, i] * motors[0, i] * current
@@ -99,6 +99,9 @@ def advance(state, before, impulse, seconds, volts, push, motors, matrices, axes
 class Plant:
     """A robot in SI units. All of `numbers` is what a robot file says of it, in words of this module.
 
+    With "loop" (k_p [V s/rad], k_i [V/rad], rate [Hz]) its firmware takes speeds of the wheels:
+    volts = k_p (command - speed) + k_i sum, which stops to sum where the volts are at their limit.
+
     twist, pose, wheel_angle: the truth now.
     """
 
@@ -109,8 +112,9 @@ class Plant:
         one = np.ones(wheels)
         self.directions = wrench_matrix(azimuth, numbers["lever"], np.asarray(numbers.get("roller", 0.0)))
         self.radius = numbers["radius"] * one
-        constant = numbers["gear"] * numbers["constant"] / self.radius * np.asarray(numbers.get("weak", 1.0))
-        self.motors = np.vstack([constant, numbers["resistance"] * one, self.radius])
+        per_rim = numbers["gear"] / self.radius * np.asarray(numbers.get("weak", 1.0))
+        constant, emf = per_rim * numbers["constant"], per_rim * numbers.get("emf", numbers["constant"])
+        self.motors = np.vstack([constant, numbers["resistance"] * one, self.radius, emf])
         spin = numbers.get("rotor", 0.0) * numbers["gear"] ** 2 / self.radius**2
         body = np.diag([numbers["mass"], numbers["mass"], numbers["inertia"]])
         self.mass = body + self.directions @ np.diag(spin) @ self.directions.T
@@ -125,6 +129,7 @@ class Plant:
         self.duty, self.volts = numbers.get("duty", False), float(numbers["volts"])
         turning = numbers["mass"] if numbers.get("turning", True) else 0.0
         self.flags = np.array([turning, float(self.duty), numbers.get("amperes", 1e9)])
+        self.loop = numbers.get("loop")
         self.latency, self.counts = numbers.get("latency", 0.0), numbers["counts"]
         self.push = np.zeros(3)
         self.reset(np.zeros(3))
@@ -143,7 +148,7 @@ class Plant:
         """At rest, at a pose."""
         self.state = np.array([*pose, *np.zeros(3 + self.wheels)])
         self._before, self._impulse, self._queue, self.t = np.zeros(3), np.zeros(5), [], 0.0
-        self._sent = np.zeros(self.wheels)
+        self._sent, self._sum = np.zeros(self.wheels), np.zeros(self.wheels)
         self._battery = np.array([self.volts, self.numbers.get("sag", 0.0), 0.0])
 
     @property
@@ -169,8 +174,24 @@ class Plant:
             while self._queue and self._queue[0][0] <= self.t + 1e-9:
                 self._sent = self._queue.pop(0)[1]
             until = min(end, self._queue[0][0]) if self._queue else end
-            limit = 1.0 if self.duty else self.volts
-            volts = np.clip(self._sent, -limit, limit)
-            tables = self.motors, self.matrices, self.axes, self.disc, self._battery, self.flags
-            advance(self.state, self._before, self._impulse, until - self.t, volts, self.push, *tables)
+            if self.loop:
+                self._regulated(until - self.t)
+            else:
+                limit = 1.0 if self.duty else self.volts
+                self._advance(np.clip(self._sent, -limit, limit), until - self.t)
             self.t = until
+
+    def _regulated(self, seconds: float) -> None:
+        """The loop of the firmware holds what was sent, a speed of each wheel."""
+        proportional, integral, rate = self.loop
+        ticks = max(1, round(seconds * rate))
+        for _ in range(ticks):
+            off = self._sent - self.directions.T @ self.twist / self.radius
+            raised = self._sum + off * seconds / ticks
+            volts = proportional * off + integral * raised
+            self._sum = np.where(np.abs(volts) <= self.volts, raised, self._sum)
+            self._advance(np.clip(volts, -self.volts, self.volts), seconds / ticks)
+
+    def _advance(self, volts: FloatArray, seconds: float) -> None:
+        tables = self.motors, self.matrices, self.axes, self.disc, self._battery, self.flags
+        advance(self.state, self._before, self._impulse, seconds, volts, self.push, *tables)

@@ -21,6 +21,7 @@ LQR_GAIN = {"axebot": 10.0, "xdrive": 3.0, "mecanum": 10.0}  # how much errors w
 FRICTION_SHARE = 0.9  # of dry friction that "PID + kS" puts in front
 SOFT = np.array([0.01, 0.01, 0.05])  # [m/s, m/s, rad/s] width of its tanh
 MOST_SUM, MOST_LQR_SUM = 20.0, 0.5
+PI_GAIN, PI_INTEGRAL, MOST_PI_SUM = 12.0, 0.5, 0.05  # [1/s], share of its square, [m/s] and [rad/s]
 
 
 def to_body(heading: float) -> FloatArray:
@@ -83,6 +84,23 @@ class HandPid(Rival):
     def add(self, error: FloatArray) -> None:
         """The integral, an acceleration."""
         self.sum = np.clip(self.sum + INTEGRAL * POLE**3 * error * DT, -MOST_SUM, MOST_SUM)
+
+
+class KinematicPi:
+    """A drive with a speed loop, as a user of /cmd_vel writes it: the speed of the path in the middle of the step, and
+    PI of the pose."""
+
+    def __init__(self, plant: Plant) -> None:
+        self.plant, self.sum = plant, np.zeros(3)
+
+    def step(self, t: float, pose: FloatArray, twist: FloatArray, path: Any) -> FloatArray:
+        """Speeds of the wheels [rad/s]. Shape (wheels,)."""
+        motion = path.at(np.array([t, t + self.plant.latency + 0.5 * DT]))
+        error = motion.pose[0] - pose
+        error[2] = math.remainder(error[2], 2.0 * math.pi)
+        wanted = to_body(pose[2]) @ (motion.velocity[1] + PI_GAIN * error + self.sum)
+        self.sum = np.clip(self.sum + PI_INTEGRAL * PI_GAIN**2 * error * DT, -MOST_PI_SUM, MOST_PI_SUM)
+        return self.plant.directions.T @ wanted / self.plant.radius
 
 
 class LqrIntegral(Rival):

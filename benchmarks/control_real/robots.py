@@ -71,6 +71,27 @@ NUMBERS: dict[str, Numbers] = {
         "counts": 2048,
     },
 }
+# A drive with a speed loop in its firmware: slower than the others, so are its paths.
+NUMBERS["lekiwi"] = {
+    "azimuth": (60.0, 180.0, -60.0),
+    "lever": 0.125,
+    "radius": 0.05,
+    "gear": 345.0,
+    "constant": 0.0032,
+    "emf": 0.0074,
+    "resistance": 4.4,
+    "mass": 2.5,
+    "inertia": 0.02,
+    "rotor": 2e-9,
+    "disc": (4.9, 4.9),
+    "disc_viscous": 1.0,
+    "viscous": (0.0, 0.0, 0.016),
+    "coulomb": (0.0, 0.0, 0.31),
+    "volts": 12.0,
+    "loop": (5.0, 25.0, 1000.0),
+    "counts": 4096,
+}
+SLOWER = {"lekiwi": 3.0}  # times as much time that its paths take
 SPREAD = 0.3  # a random robot has each of its numbers within this share of one of the three
 CHANGED = ("radius", "gear", "constant", "resistance", "mass", "inertia", "viscous", "coulomb", "disc", "disc_viscous")
 COUNTS = (1024, 2048, 4096)
@@ -79,7 +100,7 @@ COUNTS = (1024, 2048, 4096)
 def random_numbers(seed: int) -> Numbers:
     """A robot drawn from a seed: one of the three, its numbers changed, latency and breakaway drawn anew."""
     random = np.random.default_rng(seed)
-    numbers = dict(NUMBERS[str(random.choice(list(NUMBERS)))])
+    numbers = dict(NUMBERS[str(random.choice(["axebot", "xdrive", "mecanum"]))])
     for name in CHANGED:
         if name in numbers:
             value = np.asarray(numbers[name], float)
@@ -94,7 +115,7 @@ def random_numbers(seed: int) -> Numbers:
 
 def robot_of(name: str, numbers: Numbers) -> Robot:
     """What omnidyn is told of it: all but a weak motor and a battery that sags."""
-    if name == "axebot":
+    if name in ("axebot", "lekiwi"):
         return omnidyn.load_robot(name)
     wheels = {"roller_angle_deg": numbers["roller"]} if "roller" in numbers else {}
     friction: dict[str, Any] = {}

@@ -387,3 +387,12 @@ def _remove_stale(folder: Path) -> None:
 def sha256(content: bytes | str) -> str:
     """Hexadecimal SHA-256 of a file's content, for the record of what a result was made from."""
     return hashlib.sha256(content.encode("utf-8") if isinstance(content, str) else content).hexdigest()
+
+
+def file_sha256(path: str | os.PathLike) -> str:
+    """Hexadecimal SHA-256 of a regular file of any size."""
+    digest = hashlib.sha256()
+    with open_regular(path) as stream:
+        for piece in pieces(stream, os.path.getsize(path)):
+            digest.update(piece)
+    return digest.hexdigest()

@@ -34,7 +34,7 @@ class Unit(NamedTuple):
 
 _TABLE: dict[str, dict[str, float]] = {
     TIME: {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
-    VOLTAGE: {"V": 1.0, "mV": 1e-3, "volt": 1.0, "volts": 1.0},
+    VOLTAGE: {"V": 1.0, "mV": 1e-3, "cV": 1e-2, "dV": 0.1, "volt": 1.0, "volts": 1.0},
     CURRENT: {"A": 1.0, "mA": 1e-3, "amp": 1.0, "amps": 1.0},
     DUTY: {"duty": 1.0, "%": 0.01, "percent": 0.01, "pct": 0.01, "pwm": 1.0 / 255.0},
     LENGTH: {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "in": 0.0254, "inch": 0.0254, "ft": 0.3048},
@@ -148,17 +148,11 @@ def parse_unit(text: str) -> Unit:
 
     Counts of an encoder with a divisor are an angle: "ticks/2000". "pwm" is 0..255 unless a divisor says otherwise.
     """
-    clean = text.strip()
-    usual = _usual(clean) if len(clean) <= MAX_TEXT else ""
-    if usual in _NAMES:  # "1/min" too, which begins with a number
-        return Unit(usual, *_NAMES[usual])
-    match = _UNIT.fullmatch(clean) if len(clean) <= MAX_TEXT else None
-    name = _usual(match[2].strip()) if match else clean[:MAX_TEXT]
-    meaning = _NAMES.get(name)
-    if meaning is None and match and (meaning := _per_time(usual)) is not None:
-        return Unit(usual, *meaning)
-    meaning = meaning or _per_time(name)
-    if match is None or meaning is None:
+    unit = _unit(text)
+    if unit is None:
+        clean = text.strip()
+        match = _UNIT.fullmatch(clean) if len(clean) <= MAX_TEXT else None
+        name = _usual(match[2].strip()) if match else clean[:MAX_TEXT]
         matches = difflib.get_close_matches(name, [*_NAMES, *_SPELLINGS], n=1, cutoff=0.5)
         raise InputError(
             "unknown unit",
@@ -166,6 +160,35 @@ def parse_unit(text: str) -> Unit:
             expected="a unit such as rad/s, rpm, mA or ticks/2000",
             remedy=f"did you mean {matches[0]}?" if matches else "",
         )
+    return unit
+
+
+def known_unit(text: str) -> Unit | None:
+    """The unit, or None where `text` names none."""
+    try:
+        return _unit(text)
+    except InputError:
+        return None
+
+
+def _unit(text: str) -> Unit | None:
+    """The unit, or None for an unknown name. Raises InputError for one of no size."""
+    clean = text.strip()
+    if len(clean) > MAX_TEXT:
+        return None
+    usual = _usual(clean)
+    if usual in _NAMES:  # "1/min" too, which begins with a number
+        return Unit(usual, *_NAMES[usual])
+    match = _UNIT.fullmatch(clean)
+    if match is None:
+        return None
+    name = _usual(match[2].strip())
+    meaning = _NAMES.get(name)
+    if meaning is None and (meaning := _per_time(usual)) is not None:
+        return Unit(usual, *meaning)
+    meaning = meaning or _per_time(name)
+    if meaning is None:
+        return None
     quantity, size = meaning
     if match[3]:
         divisor = float(match[3])
@@ -211,11 +234,3 @@ def _per_turn(quantity: str, size: float, name: str) -> tuple[str, float]:
     if quantity in (COUNT, COUNT_RATE):
         return (ANGLE if quantity == COUNT else TURN_RATE), TURN * size
     return quantity, (1.0 if name == "pwm" else size)
-
-
-def known_unit(text: str) -> Unit | None:
-    """The unit, or None where `text` names none."""
-    try:
-        return parse_unit(text)
-    except InputError:
-        return None

@@ -46,11 +46,35 @@ def test_a_shard_may_be_cut_anywhere(tmp_path):
         assert np.array_equal(column, np.concatenate([part[name] for part in parts]), equal_nan=True)
 
 
-@pytest.mark.parametrize("controller, noise", [("pid", 0.0), ("pid", 0.01), ("pid", 0.1), ("pid_no_friction", 0.0)])
-def test_loops_together_are_those_of_track(tmp_path, controller, noise):
+def late_robot(tmp_path, latency):
+    robot = load_robot("axebot")
+    save_robot(robot.replace(drive=robot.drive.replace(latency=latency)), tmp_path / "late.toml")
+    return str(tmp_path / "late.toml")
+
+
+def test_a_latency_moves_together_too(tmp_path):
+    made = problem(tmp_path, robot=late_robot(tmp_path, 0.0132))
+    assert batched(made)
+    columns, rows = batch_columns(made, 3, 9), [made.measure(sample) for sample in made.samples(3, 9)]
+    for name, column in columns.items():
+        assert column == pytest.approx([row[name] for row in rows], rel=1e-10, abs=1e-12, nan_ok=True), name
+
+
+@pytest.mark.parametrize(
+    "controller, noise, latency",
+    [
+        ("pid", 0.0, 0.0),
+        ("pid", 0.01, 0.0),
+        ("pid", 0.1, 0.0),
+        ("pid_no_friction", 0.0, 0.0),
+        ("pid", 0.01, 13e-6),
+        ("pid", 0.01, 0.033),
+    ],
+)
+def test_loops_together_are_those_of_track(tmp_path, controller, noise, latency):
     """An eight so fast that voltages meet their limit; noise so large that poses are doubted."""
     task = {"path": "eight:period_s=3.5", "controller": controller, "duration_s": 1.2, "noise_m_s": noise}
-    made = problem(tmp_path, simulate=None, track=task, samples=12)
+    made = problem(tmp_path, robot=late_robot(tmp_path, latency), simulate=None, track=task, samples=12)
     assert batched(made)
     columns = batch_columns(made, 2, 9)
     assert tuple(columns) == TRACK_METRICS

@@ -249,13 +249,13 @@ def test_a_log_that_changes_meanwhile_fails_its_shard(folder, monkeypatch):
     made = spec(folder, logs=str(folder / "gray"))
     run(made, folder)
     (folder / "out" / "shards" / "00000.parquet").unlink()
-    hashed, changed = fits._sha256, []
+    hashed, changed = fits.file_sha256, []
 
     def later(path):
         changed.append(path)
         return hashed(path) if len(changed) <= 2 else "0"
 
-    monkeypatch.setattr(fits, "_sha256", later)
+    monkeypatch.setattr(fits, "file_sha256", later)
     _, campaign = run(None, folder)
     assert "the log has changed since the campaign began" in campaign.status.failed[0]
     assert codes([campaign.verdict]) == ["campaign_failed"]

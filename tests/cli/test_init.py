@@ -602,3 +602,99 @@ def test_a_log_of_pose_and_wheels_shows_their_radius_too(call, here, wheels):
     assert robot.wheels.wheel_radius == pytest.approx(0.05, rel=0.01)
     assert robot.wheels.robot_radius == pytest.approx(0.2, rel=0.01)
     assert robot.priors["wheels.wheel_radius_m"].source == f"logs: pose and {wheels}"
+
+
+# ---- counts at the motor, behind a gear --------------------------------------------------------------------
+
+GEAR, TICKS, RADIUS, ARM = 5.0, 42, 0.0757, 0.36  # of a mecanum robot; ARM: half track + half wheelbase [m]
+
+
+def mecanum_counts(path):
+    """A drive of a mecanum robot: whole counts of its motors, and where it is. Rollers at 45 degrees, in an X.
+
+    The law of textbooks, wheels forward positive: FL (vx - vy - A w)/r, FR (vx + vy + A w)/r, RL (vx + vy - A w)/r,
+    RR (vx - vy + A w)/r; those on the left have a minus here, for a wheel counts counter-clockwise about the robot.
+    """
+    dt, turns, pose, rows = 1e-3, np.zeros(4), np.zeros(3), []
+    for k in range(30_000):
+        t = k * dt
+        vx, vy, omega = 0.5 * np.sin(0.9 * t), 0.4 * np.sin(0.53 * t + 1.0), 0.7 * np.sin(0.37 * t)
+        if k % 20 == 0:
+            rows.append([t, *np.floor(turns * GEAR * TICKS), *pose])
+        forward = np.array([vx - vy - ARM * omega, vx + vy + ARM * omega, vx + vy - ARM * omega, vx - vy + ARM * omega])
+        turns += np.array([-1, 1, -1, 1]) * forward / RADIUS / (2.0 * np.pi) * dt
+        c, s = np.cos(pose[2] + 0.5 * omega * dt), np.sin(pose[2] + 0.5 * omega * dt)
+        pose += dt * np.array([c * vx - s * vy, s * vx + c * vy, omega])
+    head = "t_s,a1,a2,a3,a4,x_m,y_m,heading_rad"
+    np.savetxt(path, rows, delimiter=",", header=head, comments="", fmt="%.6f")
+
+
+COUNTS = ("--mecanum", "--mass", "10", "--log", "log.csv", "--assume", "a=ticks/42@motor")
+
+
+@pytest.fixture(scope="module")
+def counts(tmp_path_factory):
+    path = tmp_path_factory.mktemp("counts") / "log.csv"
+    mecanum_counts(path)
+    return path.read_bytes()
+
+
+@pytest.fixture
+def counted(here, counts):
+    (here / "log.csv").write_bytes(counts)
+    return here
+
+
+def test_a_gear_that_is_given_stands_between_counts_at_the_motor_and_the_wheel(call, counted):
+    """A radius of .0757 m was written as .0151 m, "measured"."""
+    code, _, err = call("init", "bot", *COUNTS, "--gear-ratio", "5")
+    assert code == 0
+    assert "behind the gear of 5 that was given" in err
+    assert "warning" not in err
+    robot = load_robot(counted / "bot.toml")
+    assert robot.wheels.wheel_radius == pytest.approx(RADIUS, rel=0.01)
+    assert robot.wheels.robot_radius == pytest.approx(ARM, rel=0.01)
+    assert robot.priors["wheels.wheel_radius_m"].origin == "measured"
+    assert (robot.motor.gear_ratio, robot.priors["motor.gear_ratio"]) == (5.0, Prior(origin="given"))
+
+
+def test_a_gear_beside_counts_of_nobody_knows_which_shaft_is_a_condition(call, counted):
+    code, _, err = call("init", "bot", *COUNTS[:-1], "a=ticks/42", "--gear-ratio", "5")
+    assert code == 0
+    assert "if the logged speeds are those of the wheels, behind the gear; if they are those of the motors, add" in err
+
+
+def test_without_a_gear_counts_at_the_motor_show_no_radius_but_with_one_they_show_the_gear(call, counted):
+    code, _, err = call("init", "bot", *COUNTS)
+    assert code == 2
+    assert "without --gear-ratio the wheel radius is not in the logs" in err
+    assert "--wheel-radius missing" in err
+    code, _, err = call("init", "bot", *COUNTS, "--wheel-radius", "0.0757")
+    assert code == 0
+    robot = load_robot(counted / "bot.toml")
+    assert robot.wheels.wheel_radius == 0.0757
+    assert robot.motor.gear_ratio == pytest.approx(GEAR, rel=0.01)
+    assert robot.priors["motor.gear_ratio"].origin == "measured"
+
+
+@pytest.mark.parametrize(
+    "unit, gear, radius, words",
+    [
+        ("ticks/42@motor", "5", "0.0757", ""),
+        ("ticks/42", "5", "0.0757", ""),  # not said, and told by the gear
+        ("ticks/210", "5", "0.0757", ""),  # of the wheel
+        ("ticks/42@motor", "7", "0.0757", "logged speeds are 0.71"),
+        ("ticks/42@motor", "5", "0.0379", "logged speeds are 0.5"),
+        ("ticks/210@motor", "5", "0.0757", "logged speeds are 0.2"),
+        ("ticks/42", "7", "0.0757", "expected 1, or 7 at the motor"),
+    ],
+)
+def test_a_gear_that_logs_contradict_is_named_and_kept(call, counted, unit, gear, radius, words):
+    known = ["--gear-ratio", gear, "--wheel-radius", radius]
+    code, _, err = call("init", "bot", *COUNTS[:-1], f"a={unit}", *known)
+    assert code == 0
+    assert ("omnidyn: warning: " in err) == bool(words)
+    assert words in err
+    robot = load_robot(counted / "bot.toml")
+    assert (robot.motor.gear_ratio, robot.wheels.wheel_radius) == (float(gear), float(radius))
+    assert robot.priors["motor.gear_ratio"].origin == "given"

@@ -143,7 +143,7 @@ def test_a_missing_file_is_told_before_anything_slow_is_loaded(here, arguments):
         env=environment(),
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=600,
         check=True,
     )
     assert result.stdout == "3 []\n"

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from omnidyn.compiled.kernel import kept, kernel
 from omnidyn.compiled.listeners import told
 from omnidyn.identification.first_runs import first_runs
 from omnidyn.progress import Report
+from tests.support.outputs import hear
 
 SOURCE = str(Path(omnidyn.__file__).resolve().parents[1])
 
@@ -91,15 +91,13 @@ def test_who_waits_for_the_compiler_is_told_of_it_once(capsys, monkeypatch):
     for name in ("SILENT_S", "NEW_S", "BEAT_S"):
         monkeypatch.setattr(f"omnidyn.cli.terminal.progress.{name}", 0.03)
     with shown_progress("walking") as progress, told("a kernel"):
-        time.sleep(0.15)
+        err = hear(capsys, "walking")
         progress(Report("running"))
-        time.sleep(0.15)
-    err = capsys.readouterr().err
+        err = hear(capsys, "running", err)
     assert err.count("`omnidyn warm` compiles for all commands, once") == 1
     assert err.index("omnidyn warm") < err.index("walking") < err.index("running")
     with shown_progress("walking"):
-        time.sleep(0.15)
-    assert "warm" not in capsys.readouterr().err
+        assert "warm" not in hear(capsys, "walking")
 
 
 # ---- that it is enough -----------------------------------------------------------------------------------

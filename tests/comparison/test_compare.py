@@ -12,6 +12,7 @@ from omnidyn.cli.terminal.streams import to_json
 from omnidyn.comparison.compare import what_is_compared
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.robot_file import load_robot
+from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.run import Run
 from tests.support.codes import codes
 from tests.support.compared_logs import NOISE, POSE_NOISE, clean_log, coulomb_times, noisy
@@ -127,6 +128,10 @@ def test_logs_may_hold_different_channels(logs):
     assert found.by_segment["axebot"]["vx"][1] is None
     assert found.overall["axebot"]["w1"].samples == 802
     assert "0" in found.summary(segments=True)
+    absent = found.trace("axebot", "vx", found.segments[1])
+    assert np.isnan(absent.measured).all()
+    assert absent.model == pytest.approx(logs[1].twist[:, 0], abs=0.1)
+    assert draw_overlay(found, log=1, channels=("vx", "w1")).svg
 
 
 def test_a_gap_makes_segments(logs):

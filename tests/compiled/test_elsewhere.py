@@ -4,7 +4,6 @@ import contextlib
 import os
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -51,7 +50,7 @@ def hits(compiled):
 def test_what_the_other_process_compiled_is_taken(alone):
     module, children = alone
     with compiled_elsewhere(module.twice, module.needs_it):
-        assert [child.wait(60.0) for child in children] == [0]
+        assert [child.wait(600.0) for child in children] == [0]
     module.needs_it()
     assert hits(module.twice) == 1
 
@@ -66,7 +65,7 @@ def test_nothing_is_started_where_it_is_there(alone):
 def test_one_that_dies_leaves_the_work_to_us(alone):
     module, children = alone
     with compiled_elsewhere(module.twice, module.dies):
-        assert children[0].wait(60.0) == 3
+        assert children[0].wait(600.0) == 3
         module.needs_it()
     assert hits(module.twice) == 0
 
@@ -74,20 +73,16 @@ def test_one_that_dies_leaves_the_work_to_us(alone):
 @pytest.mark.parametrize("ends", [KeyboardInterrupt, ValueError])
 def test_whatever_ends_us_ends_the_other(alone, ends):
     module, children = alone
-    begun = time.monotonic()
     with contextlib.suppress(ends), compiled_elsewhere(module.twice, module.waits):
         raise ends
-    assert time.monotonic() - begun < 10.0
-    assert children[0].returncode not in (None, 0)
+    assert children[0].returncode not in (None, 0)  # 0: it was waited for
 
 
 def test_it_is_not_waited_for(alone):
     module, children = alone
-    begun = time.monotonic()
     with compiled_elsewhere(module.twice, module.waits):
         assert children[0].poll() is None
-    assert time.monotonic() - begun < 10.0
-    assert children[0].returncode not in (None, 0)
+    assert children[0].returncode not in (None, 0)  # 0: it was waited for
 
 
 def test_one_processor_shares_nothing(alone, monkeypatch):

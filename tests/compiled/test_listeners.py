@@ -32,7 +32,7 @@ def test_who_waits_can_see_that_a_kernel_is_being_compiled(monkeypatch, folder):
     assert [name.rpartition(".")[2] for name in seen] == ["twice", "wrong"]
     ((name, seconds),) = compiling.done
     assert name.endswith("twice")
-    assert 0.0 < seconds < 60.0
+    assert seconds > 0.0
     assert compiling.under_way == []
 
 

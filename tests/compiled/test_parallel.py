@@ -22,7 +22,7 @@ def test_results_stand_in_the_order_of_their_items():
 
 def test_two_run_at_a_time():
     """Each waits for the other: one after the other they would wait for ever."""
-    both = threading.Barrier(2, timeout=20.0)
+    both = threading.Barrier(2, timeout=200.0)
     assert len(side_by_side(lambda _: both.wait(), range(2))) == 2
 
 

@@ -16,6 +16,8 @@ from omnidyn.control.late_pose import LatePose
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.mpc.model import DECAY, LINEAR_SIZE, PHI, PSI, STEP, held_for, numbers
 from omnidyn.control.pid import Pid
+from omnidyn.export.code.c_controller import c_controller
+from omnidyn.export.ros.node import ros2_node
 from omnidyn.model.log_effects import Lateness, LogEffects, Sensors
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
 from omnidyn.simulation.live import LiveRobot
@@ -85,6 +87,45 @@ def test_what_a_fit_found_of_its_logs_is_what_controllers_take():
     assert fitted.sensor_model == Sensors(twist="mean", pose_delay=0.05)
     assert fitted.replace(sensors=Sensors()).sensor_model == Sensors()
     assert AXEBOT.sensor_model == Sensors()
+
+
+def test_speeds_of_a_log_of_counts_are_means():
+    counted = AXEBOT.replace(log=LogEffects(latency=Lateness(wheel_angle=0.01)))
+    assert counted.sensor_model == Sensors(twist="mean")
+
+
+def test_the_lag_of_poses_in_a_log_is_told_where_a_controller_takes_it():
+    fitted = AXEBOT.replace(log=LogEffects(latency=Lateness(averaged=True, position=0.05)))
+    found = omnidyn.track(fitted, "circle", "pid", duration=1.0)
+    assert [warning.code for warning in found.run.warnings] == ["pose_lag_of_log"]
+    assert 'write twist = "mean" and pose_delay_s = 0 under [sensors]' in " ".join(found.summary().split())
+    assert "0.05 s old" in " ".join(c_controller(fitted).notes)
+    assert "0.05 s old" in " ".join(ros2_node(fitted, controller="pid").notes)
+    told_by_file = fitted.replace(sensors=Sensors(twist="mean"))
+    for quiet in (
+        omnidyn.track(told_by_file, "circle", "pid", duration=1.0),
+        omnidyn.track(fitted, "circle", "pid", duration=1.0, sensors="encoder"),
+    ):
+        assert not quiet.run.warnings
+
+
+def test_a_fit_to_counts_of_wheels_gives_means_and_says_what_controllers_take_of_its_camera():
+    """From a log of counts and a late camera to a loop on encoders, as its user would go."""
+    robot, dt, late = AXEBOT, 0.02, 3
+    rng, n = np.random.default_rng(0), 500
+    volts = np.repeat(rng.uniform(-5.0, 5.0, (n // 25, 3)), 25, axis=0)
+    run = omnidyn.simulate(robot, volts, dt)
+    tick = 2.0 * np.pi / 4096
+    angle = np.concatenate(
+        [np.zeros((1, 3)), np.cumsum(0.5 * (run.wheel_speed[1:] + run.wheel_speed[:-1]) * dt, axis=0)]
+    )
+    pose = run.pose[np.maximum(np.arange(len(run.t)) - late, 0)] + 5e-4 * rng.standard_normal(run.pose.shape)
+    log = omnidyn.Run(t=run.t, voltage=run.voltage, wheel_angle=np.round(angle / tick) * tick, pose=pose)
+    found = omnidyn.identify(log, robot)
+    fitted = found.estimate.robot
+    assert fitted.sensor_model.twist == "mean"
+    assert fitted.sensor_model.pose_delay == pytest.approx(late * dt, abs=0.01)
+    assert "pose_lag_of_log" in [step.code for step in found.advice]
 
 
 def test_the_table_of_a_file_is_read_and_written():

@@ -16,9 +16,9 @@ def test_what_comes_back_and_what_does_not(monkeypatch):
             worker.ask(divmod, 1, 0)
         with pytest.raises(RuntimeError, match="died, exit code 7"):
             worker.ask(os._exit, 7)
-        monkeypatch.setattr(module, "LONGEST", 0.2)
+        monkeypatch.setattr(module, "LONGEST", 1.0)
         assert worker.ask(_busy, 60.0) is None
-        assert worker.ask(_asleep, 0.5) == "rested"  # while it waits it takes no time of the processor
+        assert worker.ask(_asleep, 2.0) == "rested"  # while it waits it takes no time of the processor
         monkeypatch.setattr(module, "LONGEST", 60.0)
         assert worker.ask(max, 3, 5) == 5
 

@@ -17,6 +17,7 @@ from omnidyn.identification.validation import Score, coloured, validate
 from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
+from omnidyn.report.figures.residuals import draw_residuals
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, excitation, noisy_draw
@@ -50,6 +51,23 @@ def test_a_held_out_log_is_compared_as_it_was_fitted(fit):
         assert score.chi2 == pytest.approx(1.0, abs=0.1)
     assert omnidyn.compare(fit.robot, impaired(2)).rmse["vx"] > 1.2 * NOISE[0]
     assert "held-out logs are predicted as well as the noise allows" in found.summary()
+
+
+def test_logs_of_different_channels_are_compared_each_by_its_own():
+    """One log has the speeds of the robot, the other those of its wheels: each score is of the rows that have it."""
+    of_body = noisy_draw(simulate(AXEBOT, excitation(8.0), 0.01), 1)
+    run = simulate(AXEBOT, excitation(8.0, seed=2), 0.01)
+    wheels = run.wheel_speed + 0.2 * np.random.default_rng(2).normal(size=run.wheel_speed.shape)
+    found = identify([of_body, Run(t=run.t, voltage=run.voltage, wheel_speed=wheels)], AXEBOT)
+    assert not found.failures
+    scores = found.validation.scores["fitted"]
+    assert {name: score.samples for name, score in scores.items()} == dict.fromkeys(
+        ("vx", "vy", "omega", "w1", "w2", "w3"), 801
+    )
+    for name, std in zip(("vx", "vy", "omega", "w1"), (*NOISE, 0.2), strict=True):
+        assert scores[name].rmse == pytest.approx(std, rel=0.1)
+        assert scores[name].chi2 == pytest.approx(1.0, abs=0.15)
+    assert draw_residuals(found.validation.fitted, {}).svg
 
 
 def test_what_lasts_is_not_called_small(fit):

@@ -12,7 +12,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.log_effects import Lateness, LogEffects
 from omnidyn.model.motor import Drive
 from omnidyn.model.surroundings import Floor
-from omnidyn.simulation.sensitivity.late_sample import derivatives
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.view import clock
 

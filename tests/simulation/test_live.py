@@ -47,6 +47,24 @@ def test_step_by_step_is_all_at_once(name):
         assert live.voltage == pytest.approx(run.voltage[k], abs=1e-3)
 
 
+@pytest.mark.parametrize("latency", [13e-6, 0.02, 0.033])
+@pytest.mark.parametrize("kind", ["voltage", "wheel_speed_command"])
+def test_stretches_of_rows_are_row_by_row_under_a_latency(latency, kind):
+    """What is under way goes on from one stretch to the next, and into single steps."""
+    drive = {"latency": latency} if kind == "voltage" else {"latency": latency, **SPEED, "rate": 130.0}
+    robot, rows = driven(**drive), SIZE[kind] * prbs([4.0] * 3, 0.1, 0.6, 0.02, 1)
+    whole, live = LiveRobot(robot, 0.02, tol=1e-9), LiveRobot(robot, 0.02, tol=1e-9)
+    twists = [whole.run(stretch)[0][1:] for stretch in (rows[:1], rows[1:17], rows[17:20])]
+    for row in rows[:20]:
+        live.step(row)
+        twists.append(live.twist[None])
+    np.testing.assert_allclose(np.concatenate(twists[:3]), np.concatenate(twists[3:]), atol=1e-7)
+    for one in (whole, live):
+        one.step(rows[20])
+    np.testing.assert_allclose(whole.pose, live.pose, atol=1e-7)
+    assert whole.voltage == pytest.approx(live.voltage, abs=1e-4)
+
+
 def test_a_delay_moves_commands_by_whole_steps():
     rows = prbs([4.0] * 3, 0.1, 1.0, 0.02, 1)
     late, now = LiveRobot(AXEBOT, 0.02, delay=2), LiveRobot(AXEBOT, 0.02)

@@ -11,7 +11,7 @@ from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot_file import load_robot, save_robot
-from omnidyn.simulation.sensitivity.late_sample import derivatives
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
 from tests.support.codes import codes
 

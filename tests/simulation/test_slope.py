@@ -12,7 +12,7 @@ from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.surroundings import GRAVITY, Floor
 from omnidyn.simulation.live import LiveRobot
-from omnidyn.simulation.sensitivity.late_sample import derivatives
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from tests.support.friction_shapes import shaped
 
 AXEBOT = load_robot("axebot")

@@ -15,7 +15,7 @@ from omnidyn.model.keys import all_keys
 from omnidyn.model.motor import Drive
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
 from omnidyn.simulation.live import LiveRobot
-from omnidyn.simulation.sensitivity.late_sample import derivatives
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
 
 POINTS = ((0.5, 0.0), (2.0, 4.0, 0.1), (5.0, 7.5), (9.0, 9.0))

@@ -39,7 +39,7 @@ def running(*arguments: str) -> Iterator[Studio]:
             yield Studio(process, address, int(address.split("://")[1].split("/")[0].rpartition(":")[2]))
         finally:
             process.terminate()
-            process.wait(20)
+            process.wait(200)
 
 
 @pytest.fixture(scope="module")

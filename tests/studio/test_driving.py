@@ -156,7 +156,7 @@ def test_a_worker_tells_errors_in_words_and_can_be_cancelled(tmp_path):
         assert await worker.run("example", {"path": path}, lambda *_: None) == {}  # the same process goes on
         await worker.stop()
 
-    asyncio.run(asyncio.wait_for(work(), 120))
+    asyncio.run(asyncio.wait_for(work(), 600))
     assert len(omnidyn.read_log(tmp_path / "again.csv")) == 4001
 
 
@@ -188,9 +188,9 @@ def test_a_page_that_says_nothing_gets_few_frames_and_the_newest_when_it_is_back
             await page.send(f'{{"seen": {UNDER_WAY}}}')
             await asyncio.sleep(0.1)
             await send(1000)
-            assert np.frombuffer(await asyncio.wait_for(page.recv(), 5), "<f4", offset=4)[0] == 1000.0
+            assert np.frombuffer(await asyncio.wait_for(page.recv(), 120), "<f4", offset=4)[0] == 1000.0
         server.should_exit = True
         await serving
         listener.close()
 
-    asyncio.run(asyncio.wait_for(work(), 60))
+    asyncio.run(asyncio.wait_for(work(), 600))

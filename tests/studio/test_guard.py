@@ -22,7 +22,7 @@ def ask(port, path="/", method="GET", body=b"", **headers):
     given = {"Host": f"127.0.0.1:{port}", "Connection": "close", "Content-Length": str(len(body))}
     given |= {name.replace("_", "-"): value for name, value in headers.items()}
     lines = [f"{method} {path} HTTP/1.1", *(f"{name}: {value}" for name, value in given.items() if value is not None)]
-    with socket.create_connection(("127.0.0.1", port), 10) as client:
+    with socket.create_connection(("127.0.0.1", port), 120) as client:
         client.sendall("\r\n".join(lines).encode() + b"\r\n\r\n" + body)
         answer = b""
         try:

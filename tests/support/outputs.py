@@ -1,6 +1,7 @@
-"""What commands and pages say: strict JSON, the tags and text of HTML."""
+"""What commands and pages say: strict JSON, the tags and text of HTML, progress."""
 
 import json
+import time
 from html.parser import HTMLParser
 from typing import Any
 
@@ -14,6 +15,21 @@ def strict(text: str) -> Any:
         raise AssertionError(f"{name} in JSON")
 
     return json.loads(text, parse_constant=refuse)
+
+
+PATIENCE_S = 120.0  # for words that never come
+
+
+def hear(capsys: Any, words: str, so_far: str = "") -> str:
+    """Waits for words on stderr; returns all that was said. Nothing may stand on stdout."""
+    end = time.monotonic() + PATIENCE_S
+    while words not in so_far and time.monotonic() < end:
+        time.sleep(0.01)
+        out, err = capsys.readouterr()
+        assert out == ""
+        so_far += err
+    assert words in so_far
+    return so_far
 
 
 class Reader(HTMLParser):

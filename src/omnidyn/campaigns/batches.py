@@ -67,7 +67,7 @@ def batched(problem: Problem) -> bool:
     if spec.track is None:
         return False
     varied = keys if problem.draws is None else [*keys, *problem.draws.keys]
-    if robot.drive.latency or robot.wheels.traction_mu is not None or any(key.table == "drive" for key in varied):
+    if robot.wheels.traction_mu is not None or any(key.table == "drive" for key in varied):
         return False
     loop = Loop.of(problem, first, spec.track)
     plain = loop.around.sensors == Instruments() and not loop.around.delay
@@ -144,20 +144,22 @@ def _tracked(problem: Problem, start: int, stop: int) -> dict[str, FloatArray]:
     count, controller = around.steps(route), loop.controller()
     assert isinstance(controller, Pid)
     t: FloatArray = np.arange(count + 1, dtype=np.float64) * around.dt
-    noise = np.zeros((count, n, 6))
+    early = round(problem.robot.drive.latency / around.dt)
+    noise = np.zeros((count + early, n, 6))
     if around.noise:
         fixed = problem.spec.track.seed
         seeds = [seed_of(problem.spec, k) if fixed is None else fixed for k in range(start, stop)]
         for k, seed in enumerate(seeds):
-            noise[:, k] = np.random.default_rng(seed).standard_normal((count, 6)) * (around.noise * NOISE)
+            noise[:, k] = np.random.default_rng(seed).standard_normal((count + early, 6)) * (around.noise * NOISE)
     pids, (batch, holds) = PidBatch(controller, n), _moving(fleet, around.dt, route.at(0.0).pose)
     states, volts = np.empty((count + 1, n, 6)), np.empty((count, n, batch.wheels))
-    states[0] = _state(batch)
-    for k in range(count):
-        seen = states[k] + noise[k]
-        volts[k] = pids.step_batch(float(t[k]), seen[:, :3], seen[:, 3:], route)
-        batch.run(np.repeat(volts[k, :, None], holds, axis=1))
-        states[k + 1] = _state(batch)
+    for k in range(-early, count):  # before 0 it waits where the path begins; what is sent now acts when it does
+        states[max(k, 0)] = _state(batch)
+        seen = states[max(k, 0)] + noise[k]
+        sent = pids.step_batch(k * around.dt, seen[:, :3], seen[:, 3:], route)
+        batch.run(np.repeat(sent[:, None], holds, axis=1))
+        volts[max(k, 0)] = sent
+    states[count] = _state(batch)
     return _tracking(problem, loop, fleet, t, states, volts)
 
 

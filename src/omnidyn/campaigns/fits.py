@@ -7,7 +7,6 @@ fitted is a row that says why.
 from __future__ import annotations
 
 import glob
-import hashlib
 import math
 import os
 from collections.abc import Iterable, Mapping
@@ -16,7 +15,7 @@ from typing import Any
 
 from omnidyn.campaigns.spec import IdentifyTask, Spec, Variable
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.files import open_regular, pieces
+from omnidyn.files import file_sha256
 from omnidyn.identification.identification import Identification
 from omnidyn.identification.identify import identify
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
@@ -91,15 +90,7 @@ def hashes_of(spec: Spec) -> dict[str, str]:
     if spec.identify is None:
         return {}
     paths = dict.fromkeys(path for paths in spec.identify.logs.values() for path in paths)
-    return {str(file): _sha256(file) for path in paths for file in files_of(path)}
-
-
-def _sha256(path: str | Path) -> str:
-    digest = hashlib.sha256()
-    with open_regular(path) as stream:
-        for piece in pieces(stream, os.path.getsize(path)):
-            digest.update(piece)
-    return digest.hexdigest()
+    return {str(file): file_sha256(file) for path in paths for file in files_of(path)}
 
 
 def check_fit(task: IdentifyTask, robot: Robot) -> None:
@@ -135,7 +126,7 @@ def fit_row(name: str, robot: Robot, task: IdentifyTask, hashes: Mapping[str, st
     """
     paths, held_out = task.logs[name], {*task.hold_out}
     for file in (file for path in paths for file in files_of(path)):
-        if hashes and hashes.get(str(file)) != _sha256(file):
+        if hashes and hashes.get(str(file)) != file_sha256(file):
             raise InputError("the log has changed since the campaign began", where=str(file))
     try:
         logs = [load_log(path, robot, _options(task)) for path in paths]

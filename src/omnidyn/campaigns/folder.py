@@ -3,6 +3,7 @@
 manifest.json            spec, hashes of inputs and task, version, samples, rows of a shard: written once
 inputs/                  the files that the spec names, copied
 shards/00000.parquet     one shard: sample, what varied, what was measured. Written whole or not at all, never changed
+shards/00000.json        its record, written after it: a shard without one is not done. Who reads a shard compares them
 shards/00000.failed      the traceback of a shard that failed; gone once the shard is there
 lock                     held by whoever works, on the bytes of its shards; the system lets go however a process ends
 merged.parquet           all shards as one file, by `merge`: the same bytes however it was cut into shards
@@ -20,16 +21,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from omnidyn.campaigns.spec import Spec, parse_spec
+from omnidyn.campaigns.spec import INPUTS, Spec, parse_spec
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.files import open_atomic, read_text, write_atomic
+from omnidyn.files import file_sha256, open_atomic, read_text, sha256, write_atomic
 from omnidyn.logs.readers.parquet import import_pyarrow
 
 MANIFEST, SHARDS, LOCK, MERGED = "manifest.json", "shards", "lock", "merged.parquet"
-DONE, FAILED = ".parquet", ".failed"
+DONE, RECORD, FAILED = ".parquet", ".json", ".failed"
+NAMED = 5  # damaged shards that a remedy names
 SAMPLE = "sample"
 GROUP_ROWS = 2**16  # rows of a group of the merged file
 WORD = "omnidyn campaign"
+CHECKED = {"page_checksum_verification": True}  # what changes while it is read is an error
 
 
 class Manifest(NamedTuple):
@@ -46,6 +49,11 @@ class Manifest(NamedTuple):
     task_sha256: str
     samples: int
     shard_rows: int
+
+    @property
+    def sha256(self) -> str:
+        """Of all of it: of what was computed, from what, and by what."""
+        return sha256(self.to_json())
 
     @property
     def shards(self) -> int:
@@ -82,8 +90,43 @@ def _leaves(path: str, old: Any, new: Any) -> Iterator[tuple[str, tuple[Any, Any
         yield from _leaves(f"{path}.{key}" if path else key, old.get(key), new.get(key))
 
 
+def _range(samples: tuple[int, int]) -> str:
+    return f"{samples[0]} to {samples[1] - 1}"
+
+
 def _text(value: Any) -> str:
     return "none" if value is None else json.dumps(value, ensure_ascii=False)[:60]
+
+
+class Record(NamedTuple):
+    """What a shard was when it was written.
+
+    sha256: of its file. samples: from, to. manifest_sha256: of the manifest, which has the hashes of the inputs.
+    """
+
+    sha256: str
+    samples: tuple[int, int]
+    manifest_sha256: str
+
+    def to_json(self) -> str:
+        """The text of its file."""
+        return json.dumps(self._asdict()) + "\n"
+
+    def fault(self, path: Path) -> tuple[str, str, str] | None:
+        """(what, got, expected) where the record in a file is not this one, which is that of the shard as it is."""
+        try:
+            written = Record(**json.loads(path.read_bytes()))
+            first, last = map(int, written.samples)
+        except (ValueError, TypeError):
+            return "the record of this shard is damaged", path.name, "as a sweep wrote it"
+        if written.manifest_sha256 != self.manifest_sha256:
+            what, name = "this shard belongs to another manifest", "manifest of SHA-256"
+            return what, f"{name} {self.manifest_sha256}", f"{name} {written.manifest_sha256}"
+        if (first, last) != self.samples:
+            return "this shard holds other samples", _range((first, last)), _range(self.samples)
+        if written.sha256 != self.sha256:
+            return "this shard has changed since it was written", f"SHA-256 {self.sha256}", written.sha256
+        return None
 
 
 @dataclass(frozen=True)
@@ -161,6 +204,7 @@ class Folder:
                 remedy="take a new folder",
                 where=str(self.path),
             )
+        self.check_inputs()
         return before
 
     def _refuse_strangers(self, inputs: Mapping[str, bytes]) -> None:
@@ -175,17 +219,46 @@ class Folder:
         """Where a shard, or the traceback of one that failed, stands."""
         return self.path / SHARDS / f"{shard:05d}{ending}"
 
-    def is_done(self, shard: int) -> bool:
-        """Whether a shard is there."""
-        return self.shard_path(shard).exists()
+    def check_inputs(self) -> None:
+        """Raises InputError where a copy of an input is not what the campaign began with."""
+        for name, expected in self.manifest.inputs.items():
+            if name.startswith(INPUTS) and (got := file_sha256(self.path / name)) != expected:
+                raise InputError(
+                    "an input has changed since the campaign began",
+                    got=f"SHA-256 {got}",
+                    expected=expected,
+                    remedy="put the file back as it was, or start in a new folder",
+                    where=str(self.path / name),
+                )
+
+    def done(self, shards: Iterable[int]) -> tuple[int, ...]:
+        """Those of some shards that are there, with a record. Raises InputError where one differs from its record."""
+        manifest, done, faults = self.manifest, list[int](), dict[Path, tuple[str, str, str]]()
+        for shard in shards:
+            path, record = self.shard_path(shard), self.shard_path(shard, RECORD)
+            if path.exists() and record.exists():
+                done.append(shard)
+                if fault := Record(file_sha256(path), manifest.rows(shard), manifest.sha256).fault(record):
+                    faults[path] = fault
+        if faults:
+            path, (what, got, expected) = next(iter(faults.items()))
+            files, more = " ".join(map(str, [*faults][:NAMED])), len(faults) - NAMED
+            some = f"{files} and {more} more" if more > 0 else files
+            remedy = f"delete {some}, then make it again: omnidyn sweep resume {self.path}"
+            raise InputError(what, got=got, expected=expected, remedy=remedy, where=str(path))
+        return tuple(done)
 
     def write_shard(self, shard: int, columns: Mapping[str, Any]) -> None:
-        """Write a shard. Raises InputError where it cannot be written: a full disk."""
+        """Write a shard, then its record. Raises InputError where they cannot be written: a full disk."""
         pyarrow, parquet = import_pyarrow()
         sink = pyarrow.BufferOutputStream()
         parquet.write_table(pyarrow.table(dict(columns)), sink, write_page_checksum=True)
+        content, manifest = sink.getvalue().to_pybytes(), self.manifest
+        record = Record(sha256(content), manifest.rows(shard), manifest.sha256)
+        self.shard_path(shard, RECORD).unlink(missing_ok=True)  # a shard that was there is not done until the end
         try:
-            write_atomic(self.shard_path(shard), sink.getvalue().to_pybytes(), force=True)
+            write_atomic(self.shard_path(shard), content, force=True)
+            write_atomic(self.shard_path(shard, RECORD), record.to_json(), force=True)
         except InputError as error:
             remedy = f"make room there, then go on: omnidyn sweep resume {self.path}"
             raise InputError(error.what, got=error.got, remedy=remedy, where=error.where) from None
@@ -196,9 +269,10 @@ class Folder:
         write_atomic(self.shard_path(shard, FAILED), words, force=True)
 
     def status(self) -> Status:
-        """What is there. One listing of the folder."""
+        """What is there. Raises InputError where a shard or an input is not what was written."""
         manifest, names = self.manifest, sorted(os.listdir(self.path / SHARDS))
-        done = tuple(int(name[: -len(DONE)]) for name in names if name.endswith(DONE) and name[0] != ".")
+        self.check_inputs()
+        done = self.done(int(name[: -len(DONE)]) for name in names if name.endswith(DONE) and name[0] != ".")
         failed = {int(name[: -len(FAILED)]): "" for name in names if name.endswith(FAILED) and name[0] != "."}
         words = {shard: read_text(self.shard_path(shard, FAILED)) for shard in failed if shard not in set(done)}
         rows = sum(stop - start for start, stop in map(manifest.rows, done))
@@ -245,7 +319,7 @@ class Folder:
             )
         _, parquet = import_pyarrow()
         schema = self.schema(status.done)
-        tables = (with_columns(parquet.read_table(self.shard_path(shard)), schema) for shard in status.done)
+        tables = (with_columns(parquet.read_table(self.shard_path(shard), **CHECKED), schema) for shard in status.done)
         with (
             open_atomic(self.path / MERGED, force=True) as stream,
             parquet.ParquetWriter(stream, schema, write_page_checksum=True) as writer,
@@ -260,7 +334,7 @@ class Folder:
         from pyarrow.csv import write_csv
 
         sink = pyarrow.BufferOutputStream()
-        write_csv(parquet.read_table(self.path / MERGED), sink)
+        write_csv(parquet.read_table(self.path / MERGED, **CHECKED), sink)
         write_atomic(path, sink.getvalue().to_pybytes(), force=force)
 
     def schema(self, shards: Iterable[int]) -> Any:

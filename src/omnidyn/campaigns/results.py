@@ -19,7 +19,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.campaigns.fits import ENDS, VERDICT
-from omnidyn.campaigns.folder import SAMPLE, Folder, Status
+from omnidyn.campaigns.folder import CHECKED, SAMPLE, Folder, Status
 from omnidyn.campaigns.spec import GRID, SOBOL
 from omnidyn.campaigns.tasks import Problem
 from omnidyn.document import Document, Part, Points, Table, plain
@@ -92,11 +92,12 @@ class Campaign(Displayable):
     def dataset(self) -> Any:
         """All shards as a pyarrow Dataset, which reads nothing yet."""
         import_pyarrow(str(self.folder.path))
-        from pyarrow.dataset import dataset
+        from pyarrow.dataset import ParquetFileFormat, ParquetFragmentScanOptions, dataset
 
         done = self.status.done
+        checked = ParquetFileFormat(default_fragment_scan_options=ParquetFragmentScanOptions(**CHECKED))
         schema = self.folder.schema(done) if done and self.folder.spec.identify is not None else None
-        return dataset([str(self.folder.shard_path(shard)) for shard in done], schema, format="parquet")
+        return dataset([str(self.folder.shard_path(shard)) for shard in done], schema, format=checked)
 
     def column(self, name: str) -> Any:
         """One column of all samples that are there, in their order. Raises InputError for a name that none has."""

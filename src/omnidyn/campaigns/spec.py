@@ -37,6 +37,7 @@ from omnidyn.identification.methods import AUTO, FRICTION_METHODS, OUTPUT_ERROR,
 from omnidyn.model.value import FieldType, Flag, Text, Value, from_validation, number, to_list, word_of
 
 SCHEMA = 1
+INPUTS = "inputs/"  # before the name of a file that a campaign has copied
 RANDOM, LATIN, SOBOL, GRID = "random", "latin", "sobol", "grid"
 MOST_SAMPLES, MOST_SEED = 10**9, 2**63 - 1
 LINEAR, LOG = "linear", "log"

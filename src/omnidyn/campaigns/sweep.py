@@ -21,8 +21,8 @@ from omnidyn.campaigns.executors import Pool, opened
 from omnidyn.campaigns.fits import hashes_of, with_logs
 from omnidyn.campaigns.folder import SAMPLE, Folder, Manifest, as_columns, as_table
 from omnidyn.campaigns.results import Campaign
-from omnidyn.campaigns.spec import Spec, load_spec, parse_spec, spec_tables
-from omnidyn.campaigns.tasks import INPUTS, Function, Problem, Sample
+from omnidyn.campaigns.spec import INPUTS, Spec, load_spec, parse_spec, spec_tables
+from omnidyn.campaigns.tasks import Function, Problem, Sample
 from omnidyn.compiled.parallel import small_matrices
 from omnidyn.compiled.stamp import stamp
 from omnidyn.errors import InputError
@@ -69,7 +69,8 @@ def sweep(
         start, stop = ((manifest.shards * k) // parts for k in (part - 1, part))
         if start < stop:
             with home.locked(start, stop):
-                shards = [k for k in range(start, stop) if not home.is_done(k)]
+                done = {*home.done(range(start, stop))}
+                shards = [k for k in range(start, stop) if k not in done]
                 _run(home, shards, task, pool, progress)
     return Campaign(home)
 
@@ -223,13 +224,14 @@ def run_shard(folder: str, shard: int, function: Function | None) -> None:
     Raises InputError where it cannot be written.
     """
     home = Folder(Path(folder))
-    if home.is_done(shard):
+    if home.done([shard]):
         return
     try:
         columns = _columns(_problem(folder, home.manifest.to_json(), function), *home.manifest.rows(shard))
     except Exception:
         home.mark_failed(shard, traceback.format_exc())
         return
+    home.check_inputs()  # behind the work: they were read within it
     home.write_shard(shard, columns)
 
 

@@ -19,7 +19,7 @@ from omnidyn.arguments import unknown_option
 from omnidyn.arrays import FloatArray
 from omnidyn.campaigns.design import numbers, points, sample_count, seed_of
 from omnidyn.campaigns.fits import LOG, Row, check_fit, fit_row
-from omnidyn.campaigns.spec import IdentifyTask, SimulateTask, Spec, TrackTask
+from omnidyn.campaigns.spec import INPUTS, IdentifyTask, SimulateTask, Spec, TrackTask
 from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
 from omnidyn.control.controller import Controller
 from omnidyn.control.controllers import ControllerFile, check_options, controller_spec
@@ -37,7 +37,6 @@ from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 
-INPUTS = "inputs/"
 SETTLED = 0.02  # of the final speed: the twist of a simulation has settled within it
 FAR = 3.0  # std that a normal is taken to reach
 ON_LIMIT = 1e-9  # of a limit: so near, it is met

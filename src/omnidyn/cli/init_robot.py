@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import typer
@@ -15,6 +15,7 @@ from omnidyn.cli.terminal.numbers import number_list, number_words
 from omnidyn.cli.terminal.sizes import LEAST_WHEELS, MOST_WHEELS, refuse_sizes
 from omnidyn.cli.terminal.streams import say
 from omnidyn.errors import InputError
+from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.logs.geometry import Geometry, as_mecanum, wheel_geometry
 from omnidyn.logs.read_log import LogOptions
 from omnidyn.model.first_guess import (
@@ -54,6 +55,7 @@ KEYS = {
     "rotor_inertia": "motor.rotor_inertia_kg_m2",
 }
 LEAST_RADIUS, LARGEST_RADIUS = 0.012, 0.3  # [m] of a wheel; what is outside is no radius, the speeds are of a motor
+CONTRADICTED = 0.1  # a gear ratio that logs show is another one than that given, from this share on
 GEARED = 1.5  # logged speeds so many times those of the wheels are speeds before a gear
 
 
@@ -90,7 +92,8 @@ def robot_of(
     answers = complete(dict(sizes), preset, mecanum)
     refuse_sizes(_sizes(answers.value, preset))
     from_logs = {KEYS[key] for key in KEYS.keys() & (sizes.keys() - set(given_keys))}
-    robot = _as_seen(_guessed_robot(name, answers, preset, mecanum, friction), geometry, from_logs)
+    guess = _guessed_robot(name, answers, preset, mecanum, friction)
+    robot = _as_seen(guess, geometry, from_logs, values["gear_ratio"])
     return _with_motor(robot, values, preset is not None)
 
 
@@ -294,11 +297,13 @@ def from_logs(values: dict[str, Any], log: list[str], options: LogOptions, mecan
 
     copied: the wheels are those of a preset, whose radius then tells the gear.
     """
-    runs, maps = [], log_options.Maps()
-    for path, loaded in log_options.load_logs(log_options.log_files(log), None, options):
+    gear, runs, maps, at_motor = values["gear_ratio"], [], log_options.Maps(), set[str]()
+    for path, loaded in log_options.load_logs(log_options.log_files(log), None, replace(options, gear_ratio=gear)):
         maps.show(path, loaded.columns)
         runs.append(loaded.to_run())
+        at_motor |= {component_channel(key) for key, column in loaded.columns.columns.items() if column.at_motor}
     geometry = wheel_geometry(runs, "--robot-radius" if mecanum else "`azimuth`")
+    geometry = replace(geometry, at_motor=gear is None and geometry.wheels in at_motor)
     azimuth = [round(angle, 2) for angle in geometry.azimuth_deg]
     verb = "pushing towards" if mecanum else "at"
     remark = f"from {geometry.source} ({geometry.residual:.1%} unexplained)"
@@ -312,24 +317,45 @@ def from_logs(values: dict[str, Any], log: list[str], options: LogOptions, mecan
         say(f"omnidyn: centre to wheel {values['robot_radius']:g} m")
     elif values["robot_radius"] is None:
         say("omnidyn: the logs do not turn, or hold no turn rate: the distance from centre to wheel is not in them")
-    radius = 1.0 / geometry.per_metre
-    if values["wheel_radius"] is None and geometry.measured and not copied and LEAST_RADIUS < radius < LARGEST_RADIUS:
-        values["wheel_radius"] = round(radius, 4)
-        say(f"omnidyn: wheel radius {radius:.4g} m, if the logged speeds are those of the wheels, behind the gear")
+    if values["wheel_radius"] is None and geometry.measured and not copied:
+        _take_radius(values, geometry, gear is not None and geometry.wheels in at_motor)
     return geometry
 
 
-def _as_seen(robot: Robot, geometry: Geometry | None, from_logs: set[str]) -> Robot:
+def _take_radius(values: dict[str, Any], geometry: Geometry, divided: bool) -> None:
+    """Take the radius of the wheels from the logs, where they have it. divided: by the gear ratio that was given."""
+    radius = 1.0 / geometry.per_metre
+    if geometry.at_motor:
+        say("omnidyn: speeds are those of the motor shaft: without --gear-ratio the wheel radius is not in the logs")
+    elif LEAST_RADIUS < radius < LARGEST_RADIUS:
+        values["wheel_radius"] = round(radius, 4)
+        condition = "if the logged speeds are those of the wheels, behind the gear"
+        if divided:
+            condition = f"behind the gear of {values['gear_ratio']:g} that was given"
+        elif values["gear_ratio"] is not None:
+            condition += "; if they are those of the motors, add @motor to their unit"
+        say(f"omnidyn: wheel radius {radius:.4g} m, {condition}")
+
+
+def _as_seen(robot: Robot, geometry: Geometry | None, from_logs: set[str], gear: float | None) -> Robot:
     """The robot with the gear that the logged speeds show: those of the motor shaft are faster by it.
 
-    from_logs: keys of the robot file whose numbers the logs gave; their source says so.
+    from_logs: keys of the robot file whose numbers the logs gave; their source says so. gear: its ratio, where it was
+    given: that stays, and logs that contradict it are named.
     """
     if geometry is None:
         return robot
     prior = Prior(source=f"logs: {geometry.source}", origin=MEASURED)
     robot = robot.replace(priors=robot.priors | dict.fromkeys(from_logs, prior))
     ratio = geometry.per_metre * float(robot.wheels.radii.mean())
-    if ratio < GEARED:
+    if gear is not None:
+        if min(abs(ratio - 1.0), abs(ratio / gear - 1.0)) > CONTRADICTED:
+            say(
+                f"omnidyn: warning: logged speeds are {ratio:.4g} times those of such wheels; expected 1, or {gear:g} "
+                "at the motor: check --gear-ratio, --wheel-radius and the unit of the speeds; --gear-ratio is kept"
+            )
+        return robot
+    if ratio < GEARED and not geometry.at_motor:
         return robot
     say(f"omnidyn: logged speeds are {ratio:.4g} times those of such wheels: taken as those of the motor, gear ratio")
     return with_gear(robot, round(ratio, 3), "logs: speed of the motor shaft over that of the wheel")

@@ -46,13 +46,17 @@ def compared_components(run: Run, applied: str) -> tuple[str, ...]:
 
 
 def trace_of(component: str, measured: Run, model: Run, rows: slice, current_unsigned: bool = False) -> Trace:
-    """One component over some rows. A heading is compared without its turns; currents by size where told so."""
+    """One component over some rows; NaN where its log has it not. A heading is compared without its turns.
+
+    current_unsigned: whether currents are compared by size.
+    """
     location = place(component)
     if location is None:
         raise KeyError(component)
     channel, column = location
     ours = np.asarray(getattr(model, channel))[rows, column]
-    real = np.asarray(getattr(measured, channel))[rows, column]
+    values = getattr(measured, channel)
+    real = np.full(ours.shape, np.nan) if values is None else np.asarray(values)[rows, column]
     if component == "heading":
         real = unwrapped(real, ours)
     if channel == "current" and current_unsigned:

@@ -221,7 +221,9 @@ def tracked(
         if status != OK:
             words[status] = words.get(status, 0) + 1
     limit = np.asarray(controller.limit)
-    run = _run(plant, controller, t, sent, volts, state, around).replace(warnings=live.warnings)
+    run = _run(plant, controller, t, sent, volts, state, around).replace(
+        warnings=(*live.warnings, *controller.robot.pose_lag_of_log)
+    )
     full = float(np.mean((np.abs(sent) >= limit * (1.0 - 1e-9)).any(axis=1)))
     return Tracking(
         controller.name,

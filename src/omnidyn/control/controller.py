@@ -58,6 +58,7 @@ DOUBTS = {
 MOST_BRIDGED = 2  # measurements missing in a row
 LATEST = 1.5  # steps after the one before: what comes later is not gone on from
 MOST_SUPPLY = 1e4  # [V]
+MOST_COMMAND = 3.0  # of a speed loop, in speeds without load
 LARGEST_STATE = 1e9  # of any number of a state: what is beyond is no place, and no speed
 VOLTAGE, WHEEL_SPEED = "voltage", "wheel_speed"
 
@@ -307,12 +308,19 @@ def output_kind(robot: Robot) -> str:
 
 
 def output_limit(robot: Robot) -> FloatArray:
-    """The largest output its drive takes: the voltage limit [V], a duty of 1, the no-load speed [rad/s]. (wheels,)."""
+    """The largest output its drive takes, shape (wheels,): the voltage limit [V], a duty of 1, of a speed loop [rad/s].
+
+    That is where a wheel at its no-load speed w is still driven by the whole voltage, w + u/k_p: a loop without a sum
+    needs more than the speed; MOST_COMMAND times w at the most.
+    """
     count = robot.wheels.count
     volts = per_wheel(robot.motor.voltage_limit, count)
     if robot.drive.kind == DUTY:
         return np.ones(count)
-    return no_load_speed(robot.motor, volts) if robot.drive.kind == SPEED else volts
+    if robot.drive.kind != SPEED:
+        return volts
+    fastest = no_load_speed(robot.motor, volts)
+    return fastest + volts / np.maximum(per_wheel(robot.drive.kp, count), volts / ((MOST_COMMAND - 1.0) * fastest))
 
 
 def supply_of(robot: Robot, supply: float | None = None) -> float:

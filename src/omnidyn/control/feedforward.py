@@ -17,19 +17,56 @@ from scipy.linalg import expm
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray, product
-from omnidyn.control.controller import WHEEL_SPEED, Guarded
+from omnidyn.control.controller import WHEEL_SPEED, Guarded, output_limit
 from omnidyn.control.paths.motion import Path
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import motor_wrench
 from omnidyn.model.inverse import Effort, Inverse, inverse
 from omnidyn.model.mass import per_mass
+from omnidyn.model.motor import Drive
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 
 DT = 0.02  # [s] between two steps, where nobody says
 FADE = 0.25  # on paths and floors beside, errors no longer fall below it, while voltages grow restless
 MOST_DELAY = 100  # [steps]
+LEAST_GAIN, MOST_EMF, MOST_VOLTS = 1e-6, 999.0, 9e4  # [V s/rad], [V s/rad] of a motor, [V]
 SHORTEST_STEP, LONGEST_STEP = 1e-5, 10.0  # [s] that may lie between two steps
+
+
+class LoopMotor(NamedTuple):
+    """A drive with a speed loop as motors of volts: what its proportional part does is back-EMF, its command a voltage.
+
+        u = k (c - w) + k_i sum,   k = k_p + k_i share dt        so  u = U - k w + k_i sum  with  U = k c
+
+    robot: the same with K_v l + k [V s/rad] at each wheel, and the volts U of the fastest command as voltage limit.
+    gain: k, which makes volts U of a command, shape (wheels,). sum: k_i [V/rad], shape (wheels,). share: of the sum of
+    a step that acts within it: a half on a slow robot, all of it on one that settles at once.
+    """
+
+    robot: Robot
+    gain: FloatArray
+    sum: FloatArray
+
+
+def loop_motor(robot: Robot, dt: float) -> LoopMotor:
+    """The motors that a speed loop makes of those of a robot, for steps of dt [s]."""
+    drive, motor, count = robot.drive, robot.motor, robot.wheels.count
+    emf, gear = per_wheel(motor.emf_constant, count), per_wheel(motor.gear_ratio, count)
+    proportional, integral = per_wheel(drive.kp, count), per_wheel(drive.ki, count)
+    fastest = output_limit(robot)
+
+    most = np.minimum(MOST_EMF * gear - emf, MOST_VOLTS / fastest)
+
+    def with_gain(wanted: FloatArray) -> tuple[Robot, FloatArray]:
+        gain = np.clip(wanted, LEAST_GAIN, most)
+        motors = motor.replace(emf_constant=tuple(emf + gain / gear), voltage_limit=tuple(gain * fastest))
+        return robot.replace(motor=motors, drive=Drive(dead_band=drive.dead_band, latency=drive.latency)), gain
+
+    stiff, _ = with_gain(proportional + 0.5 * dt * integral)
+    settles = max(dt * float(np.mean(step_matrices(inverse(stiff), dt).rates)), 1e-3)
+    share = -1.0 / settles - 1.0 / np.expm1(-settles)
+    return LoopMotor(*with_gain(proportional + share * dt * integral), integral)
 
 
 def voltage_for(robot: Robot, twist: ArrayLike, acceleration: ArrayLike) -> FloatArray:
@@ -151,6 +188,37 @@ class Volts:
         if together:
             return effort.voltage / max(float(np.max(np.abs(effort.voltage) / self.limit)), 1.0), met
         return np.clip(effort.voltage, -self.limit, self.limit), met
+
+
+class LoopCommands:
+    """Motions as commands of a speed loop, step by step: made ready for steps of dt [s]; friction: as of `Volts`.
+
+        command = (volts - k_i sum)/k,    sum+ = sum + dt (command - mean speed of the wheels)
+
+    The volts are those of the `LoopMotor`. The sum is that of a robot which moves as wanted: what the loop sums up
+    beyond it is its own answer to what the model misses.
+    """
+
+    def __init__(self, robot: Robot, dt: float, friction: bool = True) -> None:
+        self.loop, self.wheels = loop_motor(robot, dt), robot.wheels
+        self.limit = per_wheel(robot.motor.voltage_limit, robot.wheels.count)
+        self.volts = Volts(self.loop.robot, dt, friction)
+        held = self.volts.held
+        self._mean_then = np.linalg.solve(held.A, held.gain - dt * np.eye(3)) @ held.back / dt
+        self._mean_now = held.gain / dt - self._mean_then @ held.decay
+        self.early = float(np.mean(np.diag(self._mean_then))) - 0.5  # of a step, by which a robot is faster than a ramp
+
+    def command(
+        self, now: FloatArray, then: FloatArray, total: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(command [rad/s], mean speed of the wheels [rad/s], volts at the motors) of a step from twist to twist (3,).
+
+        total: the sum, shape (wheels,).
+        """
+        voltage = self.volts.softly(now, self.volts.change(now, then), then).voltage
+        twist = product(self._mean_now, now) + product(self._mean_then, then)
+        mean = wheel_speed(self.wheels, twist)
+        return (voltage - self.loop.sum * total) / self.loop.gain, mean, voltage - self.loop.gain * mean
 
 
 def _fade(model: Inverse, dt: float) -> FloatArray:

@@ -180,6 +180,13 @@ def pose_gains(rates: FloatArray, faster: float, integral: float, dt: float, lat
     return PoseGains(*np.array(gains).T)
 
 
+def place_gains(rates: FloatArray, faster: float, integral: float, dt: float, late: float = 0.0) -> PoseGains:
+    """The same where speeds are had as they are asked for: k_p = (1 - p q)/dt, k_i = (1 - p)(1 - q)/dt^2."""
+    rate = pole_rate(rates, faster, dt, late)
+    p, q = np.exp(-rate * dt), np.exp(-integral * rate * dt)
+    return PoseGains((1.0 - p * q) / dt, 0.0 * rate, (1.0 - p) * (1.0 - q) / dt**2)
+
+
 def _ackermann(a: float, rate: float, slow: float, dt: float) -> FloatArray:
     """(k_p, k_d, k_i) of an axis."""
     d, phi = np.exp(-a * dt), -np.expm1(-a * dt) / a

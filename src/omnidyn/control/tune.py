@@ -25,7 +25,7 @@ from omnidyn.control.controllers import ControllerFile, controller_spec, options
 from omnidyn.control.demand import path_demand
 from omnidyn.control.feedforward import DT
 from omnidyn.control.instruments import Instruments, instruments, told
-from omnidyn.control.mpc.settings import Settings
+from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import is_several
 from omnidyn.control.paths.path import path as path_named
@@ -251,7 +251,7 @@ def tune(
     seconds = SECONDS if path is None and duration is None else duration
     around = Circumstances(dt, seconds, min(SKIP, 0.5 * (seconds or SECONDS)), noise, delay, seed, sensors=kit)
     spec = controller_spec(controller)
-    start = _start(spec, robot)
+    start = _start(spec, robot, dt)
     follow, judged = [[path_named(item) for item in paths]] * 2 if paths else _paths(robot)
     uncertain = bool(known_errors(robot).keys)
     training, held_out = (
@@ -306,7 +306,7 @@ def _check_counts(draws: int, evaluations: int, paths: Any) -> None:
         raise InputError("nothing to follow", got="no path", expected="a path, or several", where="path")
 
 
-def _start(spec: ControllerFile, robot: Robot) -> dict[str, Setting]:
+def _start(spec: ControllerFile, robot: Robot, dt: float) -> dict[str, Setting]:
     """The settings that are looked for, as they are at first. Raises InputError where a controller has none."""
     if spec.controller not in TUNED:
         raise InputError(
@@ -318,7 +318,7 @@ def _start(spec: ControllerFile, robot: Robot) -> dict[str, Setting]:
         )
     defaults = options_of(spec.controller)
     if "volts" in defaults:  # some follow from the robot
-        defaults |= vars(Settings().of(robot))
+        defaults |= vars(Mpc(robot, dt=dt).robot_settings)
     values = {name: spec.options.get(name, defaults[name]) for name in TUNED[spec.controller]}
     return {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
 

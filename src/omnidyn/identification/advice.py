@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from omnidyn.identification.lack_of_fit import CHANGE, Remedy
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
@@ -26,6 +27,7 @@ FREEABLE = (TORQUE, "motor.resistance_ohm", "body.inertia_kg_m2")
 def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[Statement]:
     """What to measure or to ask for next, gravest first."""
     statements = [*_not_seen(fit), *_missing(fit), *_guesses(fit), *_together(fit), *_wide(fit)]
+    statements += [replace(statement, severity=NOTE) for statement in fit.robot.pose_lag_of_log]
     if validation is not None and validation.held_out is None:
         statements.append(Statement("hold_out_log", NOTE))
     return list(dict.fromkeys(statements))

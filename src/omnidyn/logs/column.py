@@ -56,6 +56,11 @@ class Column:
         return parse_unit(self.unit).size * (-1.0 if self.invert else 1.0)
 
     @property
+    def at_motor(self) -> bool:
+        """Whether what it says of a wheel is about the shaft of its motor, before the gear."""
+        return self.side == MOTOR_SIDE
+
+    @property
     def of_rim(self) -> bool:
         """Whether what it says of a wheel is about its rim: a speed in m/s, a way in m."""
         return parse_unit(self.unit).quantity in (SPEED, LENGTH)
@@ -65,12 +70,12 @@ class Column:
 
         The gear ratio before the gear, the radius [m] at the rim, else 1.
         """
-        if self.side == MOTOR_SIDE:
+        if self.at_motor:
             return float(per_wheel(robot.motor.gear_ratio, robot.wheels.count)[wheel])
         return float(per_wheel(robot.wheels.wheel_radius, robot.wheels.count)[wheel]) if self.of_rim else 1.0
 
     def __str__(self) -> str:
-        side = f" at the {self.side}" if self.side == MOTOR_SIDE else ""
+        side = f" at the {self.side}" if self.at_motor else ""
         late = f", {self.latency:g} s late" if self.latency else ""
         frame = (
             f", in the frame {self.frame}" if self.frame == ROOM else f", mounted at {self.frame}" * bool(self.frame)

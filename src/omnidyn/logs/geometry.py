@@ -44,7 +44,8 @@ class Geometry:
     azimuth_deg and its std: counter-clockwise from forward [degree], one per wheel. per_metre: wheel speed over rim
     speed [rad/m]: 1/r behind the gear, l/r at the motor. robot_radius [m]: None where the robot never turned.
     residual: rms of what the fit leaves over rms of the wheel speeds. source: which channels it is from. measured:
-    whether they were measured, and not commanded.
+    whether they were measured, and not commanded. at_motor: whether the log says that the speeds are those of the motor
+    shaft, and nobody which gear is behind it.
     """
 
     azimuth_deg: tuple[float, ...]
@@ -54,6 +55,12 @@ class Geometry:
     residual: float
     source: str
     measured: bool = False
+    at_motor: bool = False
+
+    @property
+    def wheels(self) -> str:
+        """The channel of the wheels that it is from."""
+        return self.source.rpartition(" ")[2]
 
 
 def wheel_geometry(runs: Sequence[Run], instead: str = "`azimuth`") -> Geometry:

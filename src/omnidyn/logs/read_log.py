@@ -22,7 +22,7 @@ from omnidyn.logs.clock.clock import Clock
 from omnidyn.logs.clock.counters import Counters
 from omnidyn.logs.clock.restarts import EPISODE, Restart
 from omnidyn.logs.clock.stamps import timed, with_joined_stamp
-from omnidyn.logs.column import MOTOR_SIDE, Column
+from omnidyn.logs.column import Column
 from omnidyn.logs.columns.frame_of import turn_to_body, with_frames
 from omnidyn.logs.columns.guess import guess_columns, refuse_doubtful
 from omnidyn.logs.columns.guess_time import refuse_second_time
@@ -53,7 +53,7 @@ class LogOptions:
     current_unsigned: currents are |i|; they get the sign of the commanded speed, or of the voltage. max_bytes: of what
     is held at once; None: a quarter of the memory. variables: of a MATLAB file, those to read; none: all.
     beside: other files of the same experiment, of one clock: joined by their stamps. rate: rows per second [1/s] of a
-    file that has no time.
+    file that has no time. gear_ratio: of a robot that has no file yet, for what was logged at the motor shaft.
     """
 
     columns: ColumnMap | None = None
@@ -67,6 +67,7 @@ class LogOptions:
     variables: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
     rate: float | None = None
+    gear_ratio: float | None = None
 
     @property
     def of_tables(self) -> dict[str, Any]:
@@ -239,10 +240,10 @@ def log_from_table(
             values = counters.speed(key, column, values)
         values = values * column.factor
         if location[0] in SIDED:
-            values = values / _divisor(column, key, robot, location[1], table.source)
+            values = values / _divisor(column, key, robot or options.gear_ratio, location[1], table.source)
         width = len(components(location[0], wheels))
         channels.setdefault(location[0], np.full((len(table), width), np.nan))[:, location[1]] = values
-    notes += _side_notes(columns, robot)
+    notes += _side_notes(columns, robot or options.gear_ratio)
     if "pose" in channels:
         channels["pose"][:, 2] = unwrapped(channels["pose"][:, 2])
     for name in [name for name in channels if CHANNELS[name] == SCALAR]:
@@ -269,9 +270,9 @@ def log_from_table(
     return _signed(log, robot) if options.current_unsigned else log
 
 
-def _side_notes(columns: ColumnMap, robot: Robot | None) -> list[Statement]:
-    """What it means that speeds are those of the motor shaft, where no robot says the gear."""
-    if robot is not None or not any(column.side == MOTOR_SIDE for column in columns.columns.values()):
+def _side_notes(columns: ColumnMap, robot: Robot | float | None) -> list[Statement]:
+    """What it means that speeds are those of the motor shaft, where neither a robot nor a number says the gear."""
+    if robot is not None or not any(column.at_motor for column in columns.columns.values()):
         return []
     return [Statement("motor_side_without_robot", NOTE)]
 
@@ -312,9 +313,12 @@ def _wheel_count(columns: ColumnMap, robot: Robot | None, where: str) -> int:
     return count
 
 
-def _divisor(column: Column, component: str, robot: Robot | None, wheel: int, where: str) -> float:
-    """`Column.divisor`, and 1 before the gear of no robot. Raises InputError for a rim without one."""
-    if robot is not None:
+def _divisor(column: Column, component: str, robot: Robot | float | None, wheel: int, where: str) -> float:
+    """`Column.divisor` of a robot, or of its gear ratio alone; 1 before an unknown gear.
+
+    Raises InputError for a rim without a robot.
+    """
+    if isinstance(robot, Robot):
         return column.divisor(robot, wheel)
     if column.of_rim:
         raise InputError(
@@ -324,7 +328,7 @@ def _divisor(column: Column, component: str, robot: Robot | None, wheel: int, wh
             remedy="name the robot, whose file has the radius",
             where=where,
         )
-    return 1.0
+    return robot if robot is not None and column.at_motor else 1.0
 
 
 def _signed(log: Log, robot: Robot | None) -> Log:

@@ -26,7 +26,8 @@ Seconds = Annotated[float, number(-MOST_LATE, MOST_LATE)]
 class Lateness(Value):
     """By how much channels of a log are late [s], the latency of the robot's own drive included; None: by that alone.
 
-    averaged: whether the speeds of the wheels are means over the row before, which is half a row more.
+    averaged: whether the speeds of the wheels are means over the row before, as differences of counts are; that is
+    half a row more.
     """
 
     twist: Annotated[Seconds | None, Field(alias="twist_s")] = None
@@ -142,12 +143,16 @@ class LogEffects(Value):
 
 
 def sensors_of(sensors: Sensors | None, log: LogEffects | None, drive: float) -> Sensors:
-    """The sensors of a file, else what its fit found of its logs. drive: the latency of the robot [s]."""
+    """The sensors of a file, else what its fit found of its logs. drive: the latency of the robot [s].
+
+    Speeds of a robot whose log counts turns of wheels are differences of counts, so means.
+    """
     if sensors is not None or log is None:
         return sensors or Sensors()
     late = log.latency
     behind = 0.0 if late.position is None else float(late.position) - drive
-    return Sensors(twist=MEAN if late.averaged else INSTANTANEOUS, pose_delay=min(max(behind, 0.0), LATEST_POSE))
+    counted = late.averaged or late.wheel_angle is not None
+    return Sensors(twist=MEAN if counted else INSTANTANEOUS, pose_delay=min(max(behind, 0.0), LATEST_POSE))
 
 
 def log_mark(run: Run) -> str:

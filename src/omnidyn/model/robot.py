@@ -17,6 +17,7 @@ from omnidyn.model.surroundings import FARTHEST_LOAD, Floor, Variations
 from omnidyn.model.value import Flag, Text, Value, number, place
 from omnidyn.model.wheels import Wheels, check_count
 from omnidyn.shown import FIGURE, Displayable, make
+from omnidyn.statement import Statement
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -150,6 +151,14 @@ class Robot(Displayable, Value):
     def sensor_model(self) -> Sensors:
         """What its speeds and poses are to a controller: as its file says, else as the fit found of its logs."""
         return sensors_of(self.sensors, self.log, self.drive.latency)
+
+    @property
+    def pose_lag_of_log(self) -> tuple[Statement, ...]:
+        """What to know where controllers take poses for as late as in the logs of a fit: no table [sensors] says it."""
+        sensors = self.sensor_model
+        if self.sensors is not None or sensors.pose_delay <= 0.0:
+            return ()
+        return (Statement("pose_lag_of_log", subject=self.name, numbers=sensors.model_dump()),)
 
     @property
     def rigid(self) -> Robot:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
@@ -112,22 +112,36 @@ class LiveRobot:
 
     def run(self, commands: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Steps of all rows of commands, shape (rows, wheels). Returns twists and poses, the start in row 0."""
-        if self._late > 0.0 or self._under_way:
-            twists, poses = [self.twist], [self.pose]
-            for command in commands:
-                self.step(command)
-                twists.append(self.twist)
-                poses.append(self.pose)
-            return np.array(twists), np.array(poses)
         rows = np.array(commands, dtype=float)
         if self._kind != SPEED:
             rows = self._volts(rows)
-        motion = self._engine.advance(self._state, self._commands(np.full(len(rows), self.dt), rows))
-        asked = rows if motion.asked is None else motion.asked
-        self._state, self.twist, self.pose, self.voltage = motion.state, motion.twist[-1], motion.pose[-1], asked[-1]
+        steps, acting, ends = self._pieces(rows)
+        motion = self._engine.advance(self._state, self._commands(steps, acting))
+        asked = rows[-1] if motion.asked is None else motion.asked[ends[-2]]
+        self._state, self.twist, self.pose, self.voltage = motion.state, motion.twist[-1], motion.pose[-1], asked
+        self._fresh = False
         if motion.wheel_speed is not None:
             self._turning = motion.wheel_speed[-1]
-        return motion.twist, motion.pose
+        return motion.twist[ends], motion.pose[ends]
+
+    def _pieces(self, rows: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:
+        """Rows held for dt each, cut where a command begins to act: lengths [s], what acts over each, shape (pieces,
+        wheels), and where each row begins, and the end. What is still under way is kept."""
+        count, edge = len(rows), EDGE * self.dt
+        if self._late == 0.0 and not self._under_way:
+            return np.full(count, self.dt), rows, np.arange(count + 1)
+        edges = np.arange(count + 1) * self.dt
+        acts = np.concatenate([[wait for wait, _ in self._under_way], edges[:-1] + self._late])
+        acting = np.concatenate([self._acting[None], *(output[None] for _, output in self._under_way), rows])
+        near = np.rint(acts / self.dt) * self.dt
+        acts = np.where(np.abs(acts - near) <= edge, near, acts)  # so near, two times are one
+        times = np.unique(np.concatenate([edges, acts[(acts > 0.0) & (acts < edges[-1])]]))
+        begun = acts.searchsorted(times, side="right")
+        left = int(begun[-1])
+        outputs = [*(output for _, output in self._under_way), *rows][left:]
+        self._acting = acting[left]
+        self._under_way = deque(zip((acts[left:] - edges[-1]).tolist(), outputs, strict=True))
+        return np.diff(times), acting[begun[:-1]], times.searchsorted(edges)
 
     def _hold(self, length: float, command: FloatArray) -> None:
         """Go on by a length of time [s] with a command held."""

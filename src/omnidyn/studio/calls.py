@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import glob
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-MAP = "columns.toml"  # the name under which a page saves a map
 
 
 @dataclass
@@ -17,7 +16,8 @@ class LogFile:
 
     name: that a page shows. path: of the file. map: of its columns, "" for a guess. result: of the job; error: why
     there is none. series: id of its signals. progress: in words, while it is read. other: key of a log that is drawn
-    over it, with offset added to its times [s]; aligned: what the library says of that.
+    over it, with offset added to its times [s]; aligned: what the library says of that. stem: of the names of files
+    that are made of it.
     """
 
     key: str
@@ -33,6 +33,10 @@ class LogFile:
     other: str = ""
     offset: float = 0.0
     aligned: dict[str, Any] | None = None
+    stem: str = ""
+
+    def __post_init__(self) -> None:
+        self.stem = self.stem or Path(self.name).stem
 
     @property
     def label(self) -> str:
@@ -40,64 +44,114 @@ class LogFile:
         return Path(self.name).name
 
     @property
+    def map_name(self) -> str:
+        """The name under which a page saves its map."""
+        return f"{self.stem}-columns.toml"
+
+    @property
+    def si_name(self) -> str:
+        """The name under which the command line writes it as it is read."""
+        return f"{self.stem}-si.csv"
+
+    @property
     def request(self) -> dict[str, Any]:
         """How a job reads it."""
         return {"path": self.path, "map": self.map, "unsigned": self.unsigned}
 
     @property
+    def reading(self) -> tuple[str, bool]:
+        """What tells how it is read: the text of its map, and whether its currents get a sign."""
+        return Path(self.map).read_text("utf-8") if self.map else "", self.unsigned
+
+    @property
     def flags(self) -> list[str]:
         """How the command line reads it so."""
-        return ["--map", MAP] * bool(self.map) + ["--current-unsigned"] * self.unsigned
+        return ["--map", self.map_name] * bool(self.map) + ["--current-unsigned"] * self.unsigned
 
-    @property
-    def python(self) -> str:
-        """How Python reads it so, faults and all where it is read as it stands."""
-        return self.run_python if self.flags else f"omnidyn.load_log({self.name!r})"
+    def python(self, robot: str = "") -> str:
+        """How Python reads it so, faults and all where it is read as it stands. robot: a variable, "" for none."""
+        return self.run_python(robot) if self.flags else f"omnidyn.load_log({self.name!r}{robot and f', {robot}'})"
 
-    @property
-    def run_python(self) -> str:
-        """How Python makes a Run of it."""
-        words = [f", columns={MAP!r}"] * bool(self.map) + [", current_unsigned=True"] * self.unsigned
+    def run_python(self, robot: str = "") -> str:
+        """How Python makes a Run of it. robot: a variable, "" for none."""
+        words = [f", {robot}"] * bool(robot)
+        words += [f", columns={self.map_name!r}"] * bool(self.map) + [", current_unsigned=True"] * self.unsigned
         return f"omnidyn.read_log({self.name!r}{''.join(words)})"
+
+
+def named(logs: Sequence[LogFile], robot: str) -> tuple[list[str], dict[str, str], list[str]]:
+    """How the command line reads logs: lines before it, the name of each log by its key, and flags.
+
+    A flag is for all logs: where they are read in several ways, each that has flags is first written as it is read.
+    robot: of the logs, "" for none.
+    """
+    if len({log.reading for log in logs}) == 1:
+        return [], {log.key: log.name for log in logs}, logs[0].flags
+    lines = [
+        shlex.join(["omnidyn", "convert", log.name, log.si_name, *_flag(robot), *log.flags])
+        for log in logs
+        if log.flags
+    ]
+    return lines, {log.key: log.si_name if log.flags else log.name for log in logs}, []
 
 
 def check(log: LogFile, robot: str) -> tuple[str, str]:
     """Command line and Python call that check a log. robot: preset or path, "" for none."""
-    name = Path(robot).name if robot else ""
-    words = ["omnidyn", "check", log.name, *(["--robot", name] if name else []), *log.flags]
-    return shlex.join(words), f"omnidyn.check({log.python}{f', {_robot(name)}' if name else ''})"
+    name, variable, made = _robot(robot)
+    words = ["omnidyn", "check", log.name, *_flag(name), *log.flags]
+    return shlex.join(words), f"{made}omnidyn.check({log.python(variable)}{variable and ', robot'})"
 
 
 def align(log: LogFile, other: LogFile, robot: str) -> tuple[str, str]:
     """Command line and Python call that put another log on the clock of a log."""
-    name = Path(robot).name if robot else ""
-    flags = max((log.flags, other.flags), key=len)
-    words = ["omnidyn", "align", log.name, other.name, *(["--robot", name] if name else []), *flags]
-    return shlex.join(words), f"omnidyn.align({log.run_python}, {other.run_python}).offset"
+    name, variable, made = _robot(robot)
+    lines, names, flags = named((log, other), name)
+    words = ["omnidyn", "align", names[log.key], names[other.key], *_flag(name), *flags]
+    python = f"{made}omnidyn.align({log.run_python(variable)}, {other.run_python(variable)}).offset"
+    return "\n".join([*lines, shlex.join(words)]), python
 
 
 def fit(logs: Sequence[LogFile], held_out: Sequence[LogFile], robot: str, free: Sequence[str]) -> tuple[str, str]:
     """Command line and Python call that fit a robot to logs. free: keys, none for the default."""
-    name = Path(robot).name
-    words = ["omnidyn", "identify", *(log.name for log in logs), "--robot", name]
-    words += [word for log in held_out for word in ("--hold-out", log.name)]
+    name, variable, made = _robot(robot)
+    lines, names, flags = named(logs, name)
+    words = ["omnidyn", "identify", *names.values(), *_flag(name)]
+    words += [word for log in held_out for word in ("--hold-out", glob.escape(names[log.key]))]
     words += [word for key in free for word in ("--free", key)]
-    words += max((log.flags for log in logs), key=len)
-    words += ["-o", "fitted.toml", "--report", "report.html"]
+    words += [*flags, "-o", "fitted.toml", "--report", "report.html"]
     method = f", omnidyn.OutputError(free={tuple(free)!r})" if free else ""
-    held = f", hold_out={[log.name for log in held_out]!r}" if held_out else ""
-    given = ", ".join(log.python for log in logs)
-    return shlex.join(words), f"omnidyn.identify([{given}], {_robot(name)}{method}{held})"
+    held = f", hold_out={[glob.escape(log.name) for log in held_out]!r}" if held_out else ""
+    given = ", ".join(log.python(variable) for log in logs)
+    return "\n".join([*lines, shlex.join(words)]), f"{made}omnidyn.identify([{given}], robot{method}{held})"
+
+
+def compare(logs: Sequence[LogFile], robots: Sequence[str]) -> tuple[str, str]:
+    """Command line and Python call that compare one robot or two with logs; currents without sign, by size."""
+    name, variable, made = _robot(robots[0])
+    unsigned = any(log.unsigned for log in logs)
+    signed = [replace(log, unsigned=False) for log in logs]
+    lines, names, flags = named(signed, name)
+    others = [Path(other).name for other in robots[1:]]
+    words = ["omnidyn", "compare", *names.values(), *_flag(name, *others), *flags, *["--current-unsigned"] * unsigned]
+    given = ", ".join(log.run_python(variable) for log in signed)
+    more = "".join(f", omnidyn.load_robot({other!r})" for other in others) + ", current_unsigned=True" * unsigned
+    return "\n".join([*lines, shlex.join(words)]), f"{made}omnidyn.compare(robot, [{given}]{more})"
 
 
 def drive(robot: str) -> tuple[str, str]:
     """Command lines and Python calls that say where a robot begins to move, and move it."""
-    name = Path(robot).name
+    name, variable, made = _robot(robot)
     words = [["omnidyn", "deadzone", name], ["omnidyn", "simulate", name, "voltages.csv", "-o", "run.csv"]]
-    robot_words = _robot(name)
-    python = f"omnidyn.dead_zone({robot_words})\nomnidyn.simulate({robot_words}, voltages, 1 / 60)"
+    python = f"{made}omnidyn.dead_zone({variable})\nomnidyn.simulate({variable}, voltages, 1 / 60)"
     return "\n".join(map(shlex.join, words)), python
 
 
-def _robot(name: str) -> str:
-    return f"omnidyn.load_robot({name!r})"
+def _robot(robot: str) -> tuple[str, str, str]:
+    """Its name without a folder, the variable that holds it, and the line of Python that makes it; "" for none."""
+    name = Path(robot).name
+    return (name, "robot", f"robot = omnidyn.load_robot({name!r})\n") if name else ("", "", "")
+
+
+def _flag(*robots: str) -> list[str]:
+    """How the command line names robots; "" for none."""
+    return [word for name in robots if name for word in ("--robot", name)]

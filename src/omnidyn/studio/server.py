@@ -178,7 +178,8 @@ def _add_files(app: FastAPI, studio: Studio) -> None:
         path = {"map": log.map, "log": log.path}.get(what) if log else ""
         if not log or not path or not Path(path).is_file():
             return Response(status_code=404)
-        return FileResponse(path, media_type="text/plain", filename=Path(path).name)
+        name = log.map_name if what == "map" else Path(path).name
+        return FileResponse(path, media_type="text/plain", filename=name)
 
 
 def _file_of(folder: Path | None, name: str, form: re.Pattern[str], kind: str = "text/plain") -> Response:

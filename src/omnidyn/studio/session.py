@@ -94,6 +94,8 @@ class Session:
         """Take a log and check it."""
         self.count += 1
         log = LogFile(f"log{self.count}", name, path)
+        if any(other.stem == log.stem for other in self.logs.values()):
+            log.stem = f"{log.stem}-{self.count}"
         self.logs[log.key] = log
         self.start(self.check(log))
         self.changed(LOGS, FIT)

@@ -116,6 +116,11 @@ SENTENCES = {
     "tracked": Sentence(_tracked),
     "best_tracked": Sentence(_best_tracked),
     "steps_with_status": Sentence("{count} of {steps} steps: {subject}"),
+    "pose_lag_of_log": Sentence(
+        "controllers of {subject} take poses as {pose_delay:.3g} s old, as they were in the log of the fit; if yours "
+        'are new, such as those of odometry, write twist = "{twist}" and pose_delay_s = 0 under [sensors] of the robot '
+        "file"
+    ),
     "can_follow": Sentence(_can_follow),
     "cannot_follow": Sentence(_cannot_follow),
     "path_asks_for": Sentence(

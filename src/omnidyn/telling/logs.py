@@ -25,12 +25,33 @@ def _turn_rate_too_large(statement: Statement) -> str:
     return f"{given}, and up to {n['largest']:.3g} is no turn rate of a robot in rad/s"
 
 
+CHANNELS = {
+    "supply": "supply of a robot",
+    "u": "voltage of a motor",
+    "i": "current of a motor",
+    "w": "speed of a wheel",
+    "vx": "speed of a robot",
+    "vy": "speed of a robot",
+    "x": "span of a robot's positions",
+    "y": "span of a robot's positions",
+}
+SI = {"supply": "V", "u": "V", "i": "A", "w": "rad/s", "vx": "m/s", "vy": "m/s", "x": "m", "y": "m"}
+
+
+def _beyond_range(statement: Statement) -> str:
+    """no robot has so much of it"""
+    n = statement.numbers
+    size = float(f"{n['size']:.4g}")
+    return f"about {size:.6g} {n['unit'] or SI[n['of']]} is no {CHANNELS[n['of']]}"
+
+
 def _command_without_unit(statement: Statement) -> str:
     """it may be volts or a duty"""
     largest, units = statement.numbers["largest"], _units(statement)
     scale = units[-1].partition("/")[2]
+    volts = "volts or " if "V" in units else "millivolts or " if "mV" in units else ""
     looks = "a duty" if largest <= 1.0 else "percent" if largest <= 100.0 else f"a PWM value, of 0..{scale}"
-    return f"no unit is given, and up to {largest:.3g} may be {'volts or ' * ('V' in units)}{looks}"
+    return f"no unit is given, and up to {largest:.3g} may be {volts}{looks}"
 
 
 def _unit_of_other(statement: Statement) -> str:
@@ -68,6 +89,7 @@ REASONS = {
             "no unit is given, and it jumps by 360 as degrees do",
         )
     ),
+    "beyond_range": Reason(_beyond_range),
     "too_many_volts": Reason("up to {largest:.3g} {unit} cannot be: a motor gets {most_V:.3g} V at the most"),
     "too_much_duty": Reason(
         either(

@@ -48,6 +48,8 @@ ROBOTS = [
     exact_robot(2),
     driven("duty"),
     driven("speed"),
+    driven("speed").replace(drive=driven("speed").drive.replace(ki=2.0)),
+    omnidyn.load_robot("lekiwi"),
     without_losses(with_centre(random_robot(7), 7)),
     late("mecanum", 0.03),
 ]

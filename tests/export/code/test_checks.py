@@ -11,7 +11,7 @@ import omnidyn
 from tests.support.cases import case
 from tests.support.exported import WARNINGS, Stepper, exact_robot, init_robot
 from tests.support.mixed_robots import random_robot, with_band, with_bristles
-from tests.support.random_calls import ANY, SLOWEST_MS, VALID, of_fmu, of_step
+from tests.support.random_calls import ANY, MOST_MEANS, VALID, of_fmu, of_step
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
 ROBOT, WOUND = omnidyn.load_robot("axebot"), exact_robot(3)
@@ -68,29 +68,29 @@ def test_random_calls_under_sanitizers(robot, precision, count, tmp_path):
     program = of_step(robot, tmp_path / "c", precision=precision)
     found, valid = program.run(count, ANY), program.run(1000, VALID)
     assert found.kept
-    assert max(found.slowest, valid.slowest) < SLOWEST_MS
+    assert max(found.slowest, valid.slowest) < MOST_MEANS * valid.mean
     assert all(found.returned[status] for status in (OK, BAD_VOLTS, BAD_TIME, BAD_TWIST, BAD_POSE, TOO_LONG))
     assert valid.returned[OK] == 1000
 
 
 @pytest.mark.parametrize(
-    "robot, options, slowest_ms",
+    "robot, options, most",
     [
-        (init_robot(11), {"tol": None}, SLOWEST_MS),
-        pytest.param(init_robot(2), {"tol": None, "precision": "single"}, SLOWEST_MS, marks=LONG),
-        pytest.param(with_band(random_robot(4), 4), {"tol": None}, SLOWEST_MS, marks=LONG),
-        pytest.param(with_bristles(random_robot(1), 1), {"tol": None}, 10.0 * SLOWEST_MS, marks=LONG),  # 100 pieces
+        (init_robot(11), {"tol": None}, MOST_MEANS),
+        pytest.param(init_robot(2), {"tol": None, "precision": "single"}, MOST_MEANS, marks=LONG),
+        pytest.param(with_band(random_robot(4), 4), {"tol": None}, MOST_MEANS, marks=LONG),
+        pytest.param(with_bristles(random_robot(1), 1), {"tol": None}, MOST_MEANS, marks=LONG),
         pytest.param(init_robot(11), {}, math.inf, marks=LONG),
     ],
 )
-def test_random_calls_of_the_implicit_step_under_sanitizers(robot, options, slowest_ms, tmp_path):
-    """A fixed step takes no time, whatever it is given; to a tolerance a call may take a second."""
+def test_random_calls_of_the_implicit_step_under_sanitizers(robot, options, most, tmp_path):
+    """A fixed step takes no long time, whatever it is given; to a tolerance a call may take a second."""
     program, count = of_step(robot, tmp_path / "c", **options), 3000 if options else 100
     found, valid = program.run(count, ANY), program.run(count, VALID)
     assert found.kept
     assert all(found.returned[status] for status in (OK, BAD_VOLTS, BAD_TIME, BAD_TWIST, BAD_POSE, BAD_FORCE))
     assert valid.returned[OK] + valid.returned[TOO_LONG] == count
-    assert max(found.slowest, valid.slowest) < slowest_ms
+    assert max(found.slowest, valid.slowest) < most * valid.mean
 
 
 @pytest.mark.parametrize("electrical", ["quasi-static", "dynamic"])
@@ -112,7 +112,7 @@ def test_a_robot_of_20_grams_is_not_too_fast(electrical, precision, tmp_path):
 def test_the_fmu_under_sanitizers(tmp_path):
     program = of_fmu(ROBOT, tmp_path / "fmu")
     found, valid = program.run(2000, ANY), program.run(500, VALID)
-    assert max(found.slowest, valid.slowest) < SLOWEST_MS
+    assert max(found.slowest, valid.slowest) < MOST_MEANS * valid.mean
     assert found.returned[FMI_OK] + found.returned[FMI_ERROR] == 2000
     assert min(found.returned[FMI_OK], found.returned[FMI_ERROR]) > 100
     assert valid.returned[FMI_OK] == 500
@@ -128,7 +128,7 @@ def test_the_cases_that_never_returned(electrical, source, tmp_path):
     for arguments in (["1e5", "3"], ["nan", "3"], ["0.01", "nan"], ["0.01", "3", "1e10"], ["0.01", "3", "1e308"]):
         given = arguments if source == "th.c" else [*arguments, "0", "0", "0"][:2] + [*arguments, "0"][2:3] * 3
         run = ["./t", *given]
-        said = subprocess.run(run, cwd=tmp_path / "c", check=False, capture_output=True, text=True, timeout=20)
+        said = subprocess.run(run, cwd=tmp_path / "c", check=False, capture_output=True, text=True, timeout=200)
         assert "twist" in said.stdout
 
 

@@ -180,7 +180,7 @@ def test_whatever_the_robot_is_called(name):
 
 
 def test_a_drive_that_takes_speeds_of_wheels_gets_them(tmp_path):
-    """The set points that the controller of Python gives, on the way along the circle."""
+    """The set points that the controller of Python gives, on the way along the circle; they lead with its rate."""
     drive = Drive.model_validate({"kind": "speed", "rate_Hz": 100.0, "kp_V_s_rad": 0.3, "ki_V_rad": 6.0})
     robot = ROBOT.replace(name="looped", drive=drive)
     module = built(tmp_path / "node", robot, "pid")
@@ -192,5 +192,5 @@ def test_a_drive_that_takes_speeds_of_wheels_gets_them(tmp_path):
         place, twist = np.add(course.at(k * DT).pose, 0.01), [0.3, 0.0, 1.0]
         loop.measured(k * DT, place, twist)
         expected = law.step(k * DT, place, twist, course)
-        np.testing.assert_allclose(loop.step(k * DT), expected, atol=0.02)
+        np.testing.assert_allclose(loop.step(k * DT), expected, atol=0.05)
     assert np.abs(expected).max() > 5.0

@@ -10,7 +10,7 @@ from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, Wh
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.late_sample import derivatives
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from tests.reference.bristles import reference
 
 AXEBOT = load_robot("axebot")

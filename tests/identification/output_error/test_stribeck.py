@@ -14,7 +14,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.late_sample import derivatives
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from tests.reference.modes import reference
 from tests.support.codes import codes
 

@@ -195,6 +195,23 @@ def test_the_cause_is_named_first(kind, key):
     assert key in (best.key, *best.same_as)
 
 
+@pytest.mark.parametrize("scale", [1.0, 1.1])
+def test_logs_with_other_sensors_are_diagnosed_together(scale):
+    """One log has the speeds of the body, the other those of the wheels too, of which one may read 10 % more."""
+    of_body = remembered(0.0, 7)
+    run = simulate(AXEBOT, excitation(30.0, 100.0, 8), 0.01)
+    draws = np.random.default_rng(8)
+    twist = run.twist + draws.normal(size=run.twist.shape) * NOISE
+    wheels = run.wheel_speed * (scale, 1.0, 1.0) + 0.2 * draws.normal(size=run.wheel_speed.shape)
+    of_all = Run(t=run.t, voltage=run.voltage, twist=twist, wheel_speed=wheels, source="all")
+    for logs in ([of_body, of_all], [of_all, of_body]):
+        fit = identify(logs, AXEBOT, OutputError(nuisances=()))
+        assert not fit.failures
+        assert fit.lack_of_fit.found == (scale != 1.0)
+        if fit.lack_of_fit.found:
+            assert fit.lack_of_fit.follows[0].theme == "what each sensor shows"
+
+
 def test_a_gyro_alone_leaves_the_other_axes_unasked():
     """Nothing was measured along x and y: no noise to be told from, and no share of it."""
     robot = load_robot("axebot")

@@ -74,6 +74,18 @@ def test_the_same_rows_are_at_rest(runs):
     np.testing.assert_array_equal(batch.twists == 0.0, rest)
 
 
+@pytest.mark.parametrize("held", [{"breakaway": (2.4, 1.6)}, {"yaw_breakaway": 0.08}])
+def test_a_breakaway_above_its_coulomb_level_is_not_left_out(held):
+    """Along the direction of travel or about yaw."""
+    way = DirectionFriction(coulomb=(1.2, 0.8), yaw_coulomb=0.04, viscous=0.5, yaw_viscous=0.005)
+    robot = turning_robot(1).replace(friction=Friction(direction=way.replace(**held)))
+    levels = {"breakaway": way.coulomb, "yaw_breakaway": way.yaw_coulomb}
+    assert engine_kind(robot, "voltage", None) == GENERAL
+    assert engine_kind(robot.replace(friction=Friction(direction=way.replace(**levels))), "voltage", None) == ALONG
+    run, one = omnidyn.simulate_batch([robot], volts(40), DT), omnidyn.simulate(robot, volts(40), DT, tol=None)
+    np.testing.assert_allclose(run.end.twist[0], one.twist[-1], atol=1e-12)
+
+
 def test_what_has_no_block_goes_to_the_engine_of_simulate():
     robot = turning_robot(1)
     limited = robot.replace(motor=robot.motor.replace(current_limit=1.0))

@@ -12,8 +12,9 @@ from omnidyn.model.robot import Body, Robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.wheels import Wheels
 from omnidyn.simulation.coulomb.door import moved
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.sensitivity.directions import EPS, prepared
-from omnidyn.simulation.sensitivity.late_sample import Direction, VoltageProgram, derivatives, late_samples
+from omnidyn.simulation.sensitivity.late_sample import Direction, VoltageProgram, late_samples
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.way import PATH, PLACE
 from tests.reference.modes import reference

@@ -11,7 +11,7 @@ from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, Wh
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.simulation.friction_study import friction_study
-from omnidyn.simulation.sensitivity.late_sample import derivatives
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
 from tests.reference.modes_plant import plant_of
 

@@ -8,7 +8,7 @@ from omnidyn.model.deadzone import axis_patterns, breakaway_voltage
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.simulation.friction_study import friction_study
-from omnidyn.simulation.sensitivity.late_sample import derivatives
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
 from tests.reference import karnopp
 from tests.support.events import of_error

@@ -49,6 +49,19 @@ def worst(run, truth):
     return float((np.abs(run.twist - truth.twist) / [1.0, 1.0, 10.0]).max())
 
 
+def test_a_row_cut_short_by_a_latency_does_not_cut_the_steps_after_it():
+    """A latency of 13 us splits each row of 10 ms: one more step a row, not the way back from 13 us."""
+    rows = 200
+    volts = np.repeat(np.random.default_rng(0).uniform(-5.0, 5.0, (rows // 20, 3)), 20, axis=0)
+    numbers, loop, solved = plant(shaped("ellipse")), no_loop(3), []
+    for pieces in (np.array([0.01]), np.array([13e-6, 0.01 - 13e-6])):
+        voltage, dt = np.repeat(volts, len(pieces), axis=0), np.tile(pieces, rows)
+        bound = np.full(voltage.shape, np.inf)
+        run = run_implicit(numbers, voltage, bound, dt, new_state(numbers), np.zeros(3), loop, 1e-6)
+        solved.append(int(run.steps.sum()))
+    assert solved[1] <= 1.2 * solved[0], solved
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_adaptive_against_the_modes(seed):
     """DOP853 mode by mode: <= 1e-6 m/s and 1e-5 rad/s at tol 1e-7; pose, currents and what rests beside it."""

@@ -7,7 +7,7 @@ from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.friction.stribeck import SHAPES
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
-from omnidyn.simulation.sensitivity.late_sample import derivatives
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
 from tests.reference import bristles
 from tests.reference.modes import reference

@@ -13,7 +13,7 @@ import pytest
 from omnidyn.errors import InputError
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key
-from omnidyn.simulation.sensitivity.late_sample import derivatives
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
 from tests.reference.modes import reference
 from tests.support.run_differences import AGREES, BODY, CHANNELS, MOTOR, differences, held, worst

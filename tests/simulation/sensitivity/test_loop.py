@@ -9,8 +9,8 @@ import scipy.linalg
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
 from omnidyn.simulation.commands import commands
+from omnidyn.simulation.sensitivity.derivatives import derivatives, differentiate
 from omnidyn.simulation.sensitivity.directions import prepared
-from omnidyn.simulation.sensitivity.late_sample import derivatives, differentiate
 from omnidyn.simulation.simulate import simulate
 from tests.support.run_differences import AGREES, BODY, MOTOR, differences, held, worst
 

@@ -5,7 +5,8 @@ import pytest
 
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key
-from omnidyn.simulation.sensitivity.late_sample import Direction, VoltageProgram, derivatives, late_samples
+from omnidyn.simulation.sensitivity.derivatives import derivatives
+from omnidyn.simulation.sensitivity.late_sample import Direction, VoltageProgram, late_samples
 from omnidyn.simulation.sensitivity.stage import EPS
 from omnidyn.simulation.simulate import simulate
 

@@ -8,7 +8,7 @@ import pytest
 
 from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import ROTOR, WHEEL, Key
-from omnidyn.simulation.sensitivity.late_sample import derivatives
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
 from tests.reference.modes import reference
 from tests.support.run_differences import AGREES, BODY, differences, held, worst

@@ -9,7 +9,7 @@ from omnidyn.model.deadzone import breakaway_voltage
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.model.surroundings import GRAVITY, Floor
 from omnidyn.simulation.live import LiveRobot
-from omnidyn.simulation.sensitivity.late_sample import derivatives
+from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.slip.plant import load_shift, wheel_loads
 from tests.support.codes import codes
 from tests.support.friction_shapes import shaped

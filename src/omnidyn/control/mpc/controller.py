@@ -32,6 +32,7 @@ from omnidyn.control.controller import (
     OK,
     PATH_ENDED,
     TIME_STANDS_STILL,
+    VOLTAGE,
     WAITING,
     WHEEL_SPEED,
     Info,
@@ -44,7 +45,7 @@ from omnidyn.control.controller import (
     vector,
     without_slip,
 )
-from omnidyn.control.feedforward import DT, check_dt
+from omnidyn.control.feedforward import DT, check_dt, loop_motor
 from omnidyn.control.filtered_twist import FilteredTwist, filtered_twist
 from omnidyn.control.late_pose import LatePose, late_pose
 from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Batch, Memory, MpcWorkspace, control_step, expect
@@ -55,7 +56,6 @@ from omnidyn.control.pose_gate import TRUSTED, PoseGate
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope
-from omnidyn.model.wheels import wheel_speed
 
 HORIZON, MOST_HORIZON, MOST_DELAY = 20, 500, 50
 MET = 1e-5  # [V] from a limit
@@ -98,6 +98,11 @@ class Mpc:
         self.reset()
 
     @property
+    def per_volt(self) -> float | FloatArray:
+        """What is sent for a volt."""
+        return self._per_volt * self._per_command
+
+    @property
     def late_part(self) -> float:
         """By how much the delay of the drive is more than whole steps [s]."""
         return self._preview.rest
@@ -109,6 +114,9 @@ class Mpc:
         self.robot, self.output, self.limit = robot, output_kind(robot), output_limit(robot)
         self.sensors = robot.sensor_model
         self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == "duty" else 1.0
+        loop = loop_motor(robot, self.dt) if self.output == WHEEL_SPEED else None
+        self.driven = driven = robot if loop is None else loop.robot  # by volts
+        self._per_command = 1.0 if loop is None else 1.0 / loop.gain
         steps = min(robot.drive.latency / self.dt, float(MOST_DELAY)) if self.delay is None else float(self.delay)
         self.steps_late = round(steps)
         is_whole = abs(steps - self.steps_late) < LEAST_REST
@@ -116,12 +124,12 @@ class Mpc:
         rest = 0.0 if is_whole else (steps - whole) * self.dt
         self._zeros = np.zeros(robot.wheels.count)
         self._preview = Preview(self.dt, whole, self.horizon, rest)
-        self._room = MpcWorkspace.of(self.horizon, volts(robot))
+        self._room = MpcWorkspace.of(self.horizon, volts(driven))
         if rest > 0.0:
-            self._room.rest[:] = numbers(robot, rest, self.friction).linear
-        self._numbers = numbers(robot, self.dt, self.friction)
-        self.robot_settings = self.settings.of(robot)
-        self._tables = self.settings.tables(robot, self.dt, self.observer)
+            self._room.rest[:] = numbers(driven, rest, self.friction, loop).linear
+        self._numbers = numbers(driven, self.dt, self.friction, loop)
+        self.robot_settings = self.settings.of(robot, None if loop is None else driven)
+        self._tables = self.robot_settings.tables(driven, self.dt, self.observer)
         self._late_pose = late_pose(robot, self.dt, self._late_pose)
         self._filtered_twist = filtered_twist(robot, self._filtered_twist)
         self._gate = PoseGate(robot, self.dt, vars(self).get("_gate"))
@@ -179,6 +187,7 @@ class Mpc:
             self.robot_settings,
             self._preview,
             PoseGate(self.robot, self.dt),
+            self._per_command,
             _whole("count", count, 1, 10_000_000),
         )
 
@@ -261,10 +270,8 @@ class Mpc:
         elif passes < 0:
             return self._failed(t, passes, start)
         self._known = True
-        sent = self._memory.u[0] * self._per_volt
-        if self.output == WHEEL_SPEED:
-            sent = self._speeds()
-        elif self._per_volt != 1.0:
+        sent = self._memory.u[0] * self.per_volt
+        if self.output != VOLTAGE:
             sent = np.clip(sent, -self.limit, self.limit)
         self._last = sent
         status = INACCURATE if inaccurate else PATH_ENDED if t > preview.end else OK
@@ -278,17 +285,6 @@ class Mpc:
         self.reset()
         self._t = t
         return self._other(FAILED, start)
-
-    def _speeds(self) -> FloatArray:
-        """Speeds of the wheels [rad/s] by which the loop of the drive makes the volts wanted.
-
-        A loop without a sum, u = k_p (command - speed), needs u/k_p more than the speed; one with a sum finds u itself.
-        """
-        x, drive = self._memory.x, self.robot.drive
-        speed = wheel_speed(self.robot.wheels, 0.5 * (x[0, 3:] + x[1, 3:]))
-        if not np.any(drive.ki):
-            speed = speed + self._memory.u[0] / drive.kp
-        return np.clip(speed, -self.limit, self.limit)
 
     def _timing(self, t: float, since: float) -> str:
         """A word where the time of a step is wrong; what was remembered goes where a clock went back."""

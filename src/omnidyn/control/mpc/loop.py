@@ -13,7 +13,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.control.mpc.interior_point import ROOM_SIZE, QuadraticProgram, make_bounds, solve_limited
-from omnidyn.control.mpc.model import LINEAR_SIZE, STEP, Numbers, held_for
+from omnidyn.control.mpc.model import LINEAR_SIZE, STEP, SUM, Numbers, held_for
 from omnidyn.control.mpc.observer import (
     DD,
     ESTIMATE_SIZE,
@@ -34,6 +34,7 @@ from omnidyn.control.mpc.observer import (
     mean_twist,
     observe,
     run_on,
+    sum_up,
 )
 from omnidyn.control.mpc.program import (
     AGAIN,
@@ -150,14 +151,16 @@ class MpcWorkspace(NamedTuple):
 @part
 def past_delay(numbers, memory, room):
     """Move row 0 of x on by the inputs that are under way: rows 1.. of `sent`, the first of them for a part of a step
-    where the delay is no whole number of steps."""
+    where the delay is no whole number of steps. The push of the estimate becomes that of then."""
     x = memory.x
     for j in range(1, len(memory.sent)):
         model = numbers
         if (j == 1) & (room.rest[0, STEP] > 0.0):
             model = Numbers(room.rest, numbers.push, numbers.pull, numbers.levels)
         drive = drive_of(numbers.push, memory.sent, j)
-        pose, twist = run_on(model, memory.estimate, room.stage, vector(x, 0, 0), vector(x, 0, 3), drive)
+        before, begin = vector(x, 0, 0), vector(x, 0, 3)
+        pose, twist = run_on(model, memory.estimate, room.stage, before, begin, drive)
+        sum_up(model, memory.estimate, drive, mean_twist(model.linear[0, STEP], before, begin, pose, twist))
         put3(x, 0, 0, pose)
         put3(x, 0, 3, twist)
 
@@ -178,7 +181,7 @@ def last_drive(numbers, memory, room):
 def measure(numbers, settings, state, elapsed, memory, room):
     """What a measured state (6,) says of where the robot is and how it moves."""
     estimate, averaged = memory.estimate, settings[AVERAGED] != 0.0
-    if elapsed == 0.0 or (settings[LEARN] == 0.0 and not averaged):
+    if elapsed == 0.0 or (settings[LEARN] == 0.0 and not averaged and numbers.linear[0, SUM] == 0.0):
         begin_with(estimate, state)
         return
     observed = numbers
@@ -196,7 +199,7 @@ def measure(numbers, settings, state, elapsed, memory, room):
     if settings[LEARN] != 0.0:
         observe(observed, estimate, room.stage, state, drive, averaged)
     else:
-        follow(observed, estimate, room.stage, state, drive)
+        follow(observed, estimate, room.stage, state, drive, averaged)
 
 
 @part
@@ -218,6 +221,7 @@ def control(numbers, tables, preview, start, state, elapsed, memory, room):
     measure(numbers, settings, state, elapsed, memory, room)
     put3(x, 0, 0, vector(estimate, POSE, 0))
     put3(x, 0, 3, vector(estimate, TWIST, 0))
+    push = vector(estimate, PUSH, 0)
     past_delay(numbers, memory, room)
     add = nearest_turn(x[0, 2], preview[start, 2])
     if elapsed == 0.0:
@@ -257,6 +261,7 @@ def control(numbers, tables, preview, start, state, elapsed, memory, room):
         total, inaccurate = total + abs(count), count < 0
         if not moved(numbers.levels, tables.emf, limited, x, before):
             break
+    put3(estimate, PUSH, 0, push)
     for i in range(u.shape[1]):
         if not abs(u[0, i]) <= LARGEST_STATE:
             return NO_INPUT
@@ -305,7 +310,7 @@ def control_batch(numbers, tables, previews, start, states, elapsed, memories, r
 
 
 class Batch:
-    """The controllers of `count` robots; made by `Mpc.batch`. Gives volts."""
+    """The controllers of `count` robots; made by `Mpc.batch`. Gives volts, or commands of a speed loop."""
 
     def __init__(
         self,
@@ -315,10 +320,11 @@ class Batch:
         settings: Settings,
         preview: Preview,
         gate: PoseGate,
+        per_volt: float | FloatArray,
         count: int,
     ) -> None:
         self.count, self._numbers, self._tables, self._room, self._settings = count, numbers, tables, room, settings
-        self._like, self._gate = preview, gate
+        self._like, self._gate, self._per_volt = preview, gate, per_volt
         self.reset()
 
     def reset(self) -> None:
@@ -329,7 +335,7 @@ class Batch:
         self._previews: list[Preview] = []
 
     def step_batch(self, t: float, pose: FloatArray, twist: FloatArray, path: Any | Sequence[Any]) -> FloatArray:
-        """Volts of all robots from t [s] on, shape (count, wheels). Steps are `dt` apart.
+        """Volts (commands of a speed loop) of all robots from t [s] on, shape (count, wheels). Steps are `dt` apart.
 
         pose, twist: shape (count, 3), as in `Mpc.step`. path: one for all, or one for each. Who is
         nowhere, NaN, gets zeros.
@@ -354,7 +360,7 @@ class Batch:
         elapsed = np.where(self._known, self._numbers.linear[0, STEP], 0.0)
         passes = control_batch(self._numbers, self._tables, previews, start, state, elapsed, memory, self._room)
         self._known = (passes >= 0) | (passes <= INACCURATE_STEP)
-        sent = memory.u[:, 0].copy()
+        sent = memory.u[:, 0] * self._per_volt
         sent[~self._known] = 0.0
         memory.sent[~self._known] = 0.0
         return sent

@@ -4,7 +4,8 @@
     twist+ = DECAY twist + PHI (a + ...),   displacement = PHI twist + PSI (a + ...)      exact for what is constant
 
 A, B: eqs (13) (14), with viscous friction of every shape and what spins in the mass matrix. PHI = integral of e^(A s),
-PSI = integral of PHI, both from 0 to dt.
+PSI = integral of PHI, both from 0 to dt. Where the drive has a speed loop, B u is that of its commands (`LoopMotor`),
+and d grows by dt (SUM_DRIVE a - SUM_TWIST mean twist) in a step: what the sum of the loop does to the robot.
 """
 
 from __future__ import annotations
@@ -17,17 +18,19 @@ from scipy.linalg import expm
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import part
+from omnidyn.control.feedforward import LoopMotor
 from omnidyn.control.mpc.small import IDENTITY, ZERO_MATRIX, added, matrix, mm, put9, scaled
 from omnidyn.model.dynamics import discretise, frame_terms, is_decoupled, motor_wrench, state_space
 from omnidyn.model.layout import N_AXES, Plant, blank_plant
 from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import per_wheel
+from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.simulation.exact.slopes import hold_slopes
 
 DECAY, PHI, PSI, FEED, TURNING, BY_MASS = 0, 9, 18, 27, 36, 45  # columns of `linear`, matrices row by row
 ELLIPSE, STEP = 54, 57  # levels Cx, Cy [N], and the width of their slope [N m/s]; dt [s]
-ELLIPSE_FALL, LINEAR_SIZE = 58, 63  # 1/v_s [s/m], shape, exponent, and how much more at rest, along x and y [N]
+ELLIPSE_FALL = 58  # 1/v_s [s/m], shape, exponent, and how much more at rest, along x and y [N]
+SUM, SUM_DRIVE, SUM_TWIST, LINEAR_SIZE = 63, 64, 73, 82  # of a speed loop: whether, and what a drive and a twist add
 GX, BY_MASS_GX, FORWARD, BACKWARD = 0, 3, 6, 7  # columns of `levels`: direction g, M^-1 g, levels of both directions,
 SLOW_SPEED, SOFT_SPEED = 8, 9  # speed below which the level falls to 0, and below which it has a slope
 FALLING, SHAPE, POWER, MORE_FORWARD, MORE_BACKWARD, LEVEL_SIZE = 10, 11, 12, 13, 14, 15  # 1/v_s, d, more at rest
@@ -44,8 +47,8 @@ class Numbers(NamedTuple):
     levels: FloatArray
 
 
-def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
-    """The numbers of a robot for steps of dt [s]; friction: whether dry friction is among them."""
+def numbers(robot: Robot, dt: float, friction: bool = True, loop: LoopMotor | None = None) -> Numbers:
+    """The numbers of a robot for steps of dt [s]; friction: whether dry friction is among them; loop: of its drive."""
     plant, directions = _friction(robot)
     viscous = (directions.T * plant.element["viscous"]) @ directions
     motors = motor_wrench(robot)
@@ -70,9 +73,15 @@ def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
         body = plant.body
         linear[0, ELLIPSE : ELLIPSE + 2] = body.coulomb
         linear[0, ELLIPSE + 2] = SLOW_SPEEDS[0] * body.coulomb.max()
-        linear[0, ELLIPSE_FALL:LINEAR_SIZE] = body.fall, body.form, body.exponent, *(body.breakaway - body.coulomb)
+        linear[0, ELLIPSE_FALL:SUM] = body.fall, body.form, body.exponent, *(body.breakaway - body.coulomb)
         levels = _levels(robot, plant.element, directions)
-    return Numbers(linear, push, np.asarray(np.linalg.pinv(push), dtype=float), levels)
+    pull = np.asarray(np.linalg.pinv(push), dtype=float)
+    if loop is not None and np.any(loop.sum):
+        speeds = np.array([wheel_speed(robot.wheels, axis) for axis in np.eye(N_AXES)]).T
+        linear[0, SUM] = 1.0
+        linear[0, SUM_DRIVE : SUM_DRIVE + 9] = (push @ ((loop.sum / loop.gain)[:, None] * pull)).ravel()
+        linear[0, SUM_TWIST : SUM_TWIST + 9] = (push @ (loop.sum[:, None] * speeds)).ravel()
+    return Numbers(linear, push, pull, levels)
 
 
 TERMS = 18  # of the series of a change of dt, which is 1.5 dt at the most

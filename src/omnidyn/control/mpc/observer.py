@@ -16,9 +16,9 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.control.mpc.model import PHI, STEP
+from omnidyn.control.mpc.model import PHI, STEP, SUM, SUM_DRIVE, SUM_TWIST
 from omnidyn.control.mpc.riccati import V, advance
-from omnidyn.control.mpc.small import minus, plus, put3, vector
+from omnidyn.control.mpc.small import matrix, minus, mv, plus, put3, vector
 from omnidyn.control.mpc.stages import friction_at, linear_stage
 
 PUSH, SCALE, TWIST, POSE = 0, 1, 2, 3  # what is believed; rows of a table with a column for each axis
@@ -69,11 +69,25 @@ def mean_twist(dt, pose, twist, after, end):
 
 
 @part
-def follow(numbers, estimate, stage, state, drive):
-    """Without an observer: the pose measured, and the twist at which a step ends whose mean was measured."""
+def sum_up(numbers, estimate, drive, mean):
+    """Add to the push what the sum of a speed loop gains in a step under a drive, with this mean of the twist."""
+    linear = numbers.linear
+    if linear[0, SUM] != 0.0:
+        gained = minus(mv(matrix(linear, 0, SUM_DRIVE), drive), mv(matrix(linear, 0, SUM_TWIST), mean))
+        for i in range(3):
+            estimate[PUSH, i] += linear[0, STEP] * gained[i]
+
+
+@part
+def follow(numbers, estimate, stage, state, drive, averaged):
+    """Without an observer: what is measured, but the twist at which a step ends where its mean was measured."""
     before, twist = vector(estimate, POSE, 0), vector(estimate, TWIST, 0)
     after, end = run_on(numbers, estimate, stage, before, twist, drive)
     mean = mean_twist(numbers.linear[0, STEP], before, twist, after, end)
+    sum_up(numbers, estimate, drive, mean)
+    if not averaged:
+        begin_with(estimate, state)
+        return
     put3(estimate, POSE, 0, (state[0], state[1], state[2]))
     put3(estimate, TWIST, 0, plus(end, minus((state[3], state[4], state[5]), mean)))
 
@@ -86,7 +100,9 @@ def observe(numbers, estimate, stage, state, drive, averaged):
     """
     before, begin, dt = vector(estimate, POSE, 0), vector(estimate, TWIST, 0), numbers.linear[0, STEP]
     pose, twist = run_on(numbers, estimate, stage, before, begin, drive)
-    shown = mean_twist(dt, before, begin, pose, twist) if averaged else twist
+    mean = mean_twist(dt, before, begin, pose, twist)
+    shown = mean if averaged else twist
+    sum_up(numbers, estimate, drive, mean)
     unit_scale = (1.0, 1.0, 1.0)
     force = friction_at(numbers.linear, numbers.levels, unit_scale, twist, 1.0, False)[0]
     put3(estimate, TWIST, 0, twist)

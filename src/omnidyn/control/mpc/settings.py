@@ -35,6 +35,9 @@ Three = tuple[float, float, float]
 POSE: Three = (200.0, 200.0, 20.0)  # of the paper's robot, as VOLTS [1/V^2] and WALK
 VOLTS = 2e-3
 WALK: Three = (0.003, 0.003, 0.012)
+PUSH_WALK: Three = (0.02, 0.02, 0.08)
+PAPER_RATE, MOST_WALK = 6.7, 4.0  # [1/s] at which the paper's robot settles; times as much for a faster speed loop
+LOOP_VOLTS = 0.25  # of the cost of volts, of commands of a speed loop: that is smooth by itself
 POSE_NOISE: Three = (0.002, 0.002, 0.004)
 LATE_NOISE = 4.0  # times as much of a late pose: when it was taken is not known to the millisecond
 PAPER_MASS = 1.5  # [kg]
@@ -59,7 +62,8 @@ class Settings:
 
     pose, volts, walk: None: POSE, VOLTS and WALK of the paper's robot; of another volts go with the square of what a
     volt speeds it up by, pose and the square of walk with the mass. pose_noise: None: POSE_NOISE, LATE_NOISE times as
-    much where poses are late.
+    much where poses are late. push_walk: None: PUSH_WALK; behind a speed loop it goes with the rate at which that
+    settles, MOST_WALK times as much at the most: the same share of a model that is wrong is a larger push there.
     last: how much more the end of the horizon counts. again: how often at most a step is made linear anew.
     noise, pose_noise: std of the measured twist and pose that the observer expects [m/s, m/s, rad/s], [m, m, rad].
     walk, pose_walk: std of what a step may bring that the model does not know. push_walk: of the change of an unknown
@@ -77,7 +81,7 @@ class Settings:
     pose_noise: Three | None = None
     walk: Three | None = None
     pose_walk: Three = (5e-4, 5e-4, 1e-3)
-    push_walk: Three = (0.02, 0.02, 0.08)
+    push_walk: Three | None = None
     scale_walk: float = 0.005
     current: float | None = None
     slew: float | None = None
@@ -86,7 +90,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name in ("pose", "twist", "noise", "pose_noise", "walk", "pose_walk", "push_walk"):
-            if name in ("pose", "walk", "pose_noise") and getattr(self, name) is None:
+            if name in ("pose", "walk", "pose_noise", "push_walk") and getattr(self, name) is None:
                 continue
             value = np.asarray(getattr(self, name), dtype=float)
             if value.shape != (3,) or not np.all((value >= 0.0) & (value <= 1e9)):
@@ -105,11 +109,12 @@ class Settings:
         if self.volts is not None and not 1e-9 <= self.volts <= 1e9:
             raise InputError("out of range", got=self.volts, expected="1e-09 to 1e+09, or None", where="volts")
 
-    def of(self, robot: Robot) -> Settings:
-        """The settings with a number in place of each None, for a robot.
+    def of(self, robot: Robot, driven: Robot | None = None) -> Settings:
+        """The settings with a number in place of each None, for a robot; driven: as its speed loop lets it be driven.
 
         A heavier robot has more of what its model does not know, and pays less for the volts that correct it. Both laws
-        were found beside others on `bench control_real`.
+        were found beside others on `bench control_real`. A volt that a speed loop answers with more back-EMF speeds it
+        up by less, and costs less by the square of that, times LOOP_VOLTS.
         """
         heavier = min(max(robot.body.mass / PAPER_MASS, 0.1), 100.0)
         pose = tuple(heavier * weight for weight in POSE) if self.pose is None else self.pose
@@ -118,11 +123,17 @@ class Settings:
         if volts is None:
             per_volt = per_mass(robot, motor_wrench(robot).driving)[:, :2]
             volts = VOLTS * min(max(round(float(np.sum(per_volt**2)) / PER_VOLT_SQUARE, 12), 1e-3), 1e3)
+            if driven is not None:
+                volts *= LOOP_VOLTS * float(np.sum(emf(robot) ** 2) / np.sum(emf(driven) ** 2))
+        push_walk = self.push_walk
+        if push_walk is None:
+            more = 1.0 if driven is None else min(max(_rate(driven) / PAPER_RATE, 1.0), MOST_WALK)
+            push_walk = tuple(more * std for std in PUSH_WALK)
         sensors, pose_noise = robot.sensor_model, self.pose_noise
         if pose_noise is None:
             late = sensors.pose_delay > 0.0 or sensors.pose_rate is not None
             pose_noise = tuple((LATE_NOISE if late else 1.0) * std for std in POSE_NOISE)
-        return replace(self, pose=pose, walk=walk, volts=volts, pose_noise=pose_noise)
+        return replace(self, pose=pose, walk=walk, volts=volts, pose_noise=pose_noise, push_walk=push_walk)
 
     def tables(self, robot: Robot, dt: float, learn: bool) -> Tables:
         """The settings for a robot and steps of dt [s]; learn: whether the observer runs."""
@@ -141,6 +152,11 @@ class Settings:
         )
         limit = np.array([volts(robot), np.minimum(amperes * per_wheel(robot.motor.resistance, count), 1e9)])
         return Tables(table, np.full(count, settings.volts), limit, emf(robot))
+
+
+def _rate(robot: Robot) -> float:
+    """How fast motors and friction let a robot settle, the mean along x and y [1/s]."""
+    return float(-np.mean(np.diag(per_mass(robot, motor_wrench(robot).braking))[:2]))
 
 
 # The part of a path that lies ahead, on the grid of the steps: sampled in blocks, so that a step only looks it up

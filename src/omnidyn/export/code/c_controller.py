@@ -56,13 +56,14 @@ def c_controller(robot: Robot, controller: str | os.PathLike = "pid", dt: float 
     law, omissions = spec.make(robot, dt=dt), left_out(KIND, robot)
     if robot.sensor_model.in_steps(dt).twist_filter > 0.0:
         omissions = (*omissions, FILTERED)
+    notes = (*NOTES, *map(str, robot.pose_lag_of_log))
     predicts = isinstance(law, Mpc)
     code = mpc_code(law) if predicts else control_code(law)  # pyright: ignore[reportArgumentType]  none is refused
     about = [f"{law.name} of {robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in omissions)]
     head = c_comment(about)
     code = "\n\n".join([f"{head}\n{_INCLUDES.rstrip()}", _late_pose_code(law), code])
     texts = {"omnidyn_control.h": _header(law, head), "omnidyn_control.c": f"{code}\n"}
-    return Export(KIND, robot.name, texts, omissions, NOTES, folder=True)
+    return Export(KIND, robot.name, texts, omissions, notes, folder=True)
 
 
 def _header(law: Any, about: str) -> str:
@@ -81,7 +82,8 @@ def _header(law: Any, about: str) -> str:
         ABOUT=about,
         DEFINES=defines,
         UNITS=_UNITS[law.output],
-        MEMORY=(mpc_memory(law) if predicts else _MEMORY) + ("\n    omnidyn_late late;" if _is_late(law) else ""),
+        MEMORY=(mpc_memory(law) if predicts else _MEMORY + _LOOP_MEMORY * _is_commanded(law))
+        + ("\n    omnidyn_late late;" if _is_late(law) else ""),
         INPUT=(f"{mpc_input(law)}\n\n" if predicts else "")
         + (f"{filled(_LATE, ROWS=str(_late_rows(law))).strip()}\n\n" if _is_late(law) else ""),
         AHEAD=_AHEAD if predicts else _NOW_AND_AHEAD,
@@ -96,6 +98,11 @@ def _header(law: Any, about: str) -> str:
 def _is_late(law: Any) -> bool:
     """Whether the poses of its robot are old when they arrive."""
     return law.sensors.pose_age(law.dt) > 0.0
+
+
+def _is_commanded(law: Any) -> bool:
+    """Whether it remembers the sum of a speed loop."""
+    return isinstance(law, Pid) and law.output == WHEEL_SPEED
 
 
 def _late_rows(law: Any) -> int:
@@ -214,10 +221,14 @@ def control_code(controller: AnyOf) -> str:
         traced, body = _pid(controller) if isinstance(controller, Pid) else _speed(controller)
     helpers = [text for name, text in _HELPERS if f"{name}(" in "".join(traced)]
     tables = {"LIMIT": controller.limit} if controller.output == WHEEL_SPEED else _limits(controller)
+    if isinstance(controller, Pid) and controller.output == WHEEL_SPEED:
+        tables["VOLTAGE_LIMIT"] = controller.commands.limit
     constants = [f"static const float {name}[{len(table)}] = {{{_numbers(table)}}};" for name, table in tables.items()]
     numbers = {"FARTHEST": _c(LARGEST_STATE), "LARGEST": "3.0e38f", "LATEST": _c(LATEST * controller.dt)}
+    numbers["STOPS"] = "\n    self->driven = 0;" if _is_commanded(controller) else ""
     step = filled(_STEP, WANTED=textwrap.indent(body, "    "), BRIDGED=str(MOST_BRIDGED), **numbers)
-    parts = ["\n".join(constants), "\n".join(helpers), *traced, *_within(controller), step.strip()]
+    include = ["#include <string.h>"] * _is_commanded(controller)
+    parts = [*include, "\n".join(constants), "\n".join(helpers), *traced, *_within(controller), step.strip()]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -334,12 +345,28 @@ def _pid(controller: Pid) -> tuple[list[str], str]:
         f"off[2] = remainderf(off[2], {_c(2.0 * np.pi)});\n"
     )
     if controller.output == WHEEL_SPEED:
+        count = controller.robot.wheels.count
+        names = {
+            "off": (3,),
+            "heading": (),
+            "velocity": (3, 3),
+            "total": (3,),
+            "share": (),
+            "now": (3,),
+            "loop": (count,),
+        }
 
-        def speeds(*arguments: Any) -> dict[str, Any]:
-            return {"output": wheel_speed(controller.robot.wheels, controller.aim(*arguments).way)}
+        def commands(
+            off: Any, heading: Any, velocity: Any, total: Any, share: Any, now: Any, loop: Any
+        ) -> dict[str, Any]:
+            then = controller.wanted(off, heading, velocity, total) / share
+            sent, mean, volts = controller.commands.command(now, then, loop)
+            return {"output": sent, "mean": mean, "volts": volts, "then": then}
 
-        call = "(void)elapsed;\nwheel_speeds(off, pose[2], twist, (const float(*)[3])velocity, output);"
-        return [_function("wheel_speeds", names, speeds, controller)], f"{head};\n{gather}{call}"
+        call = filled(_COMMANDED, LONGEST=_c(MOST_STEPS * controller.dt)).strip()
+        return [
+            _function("commands", names, commands, controller)
+        ], f"{head}, more[3], volts[OMNIDYN_WHEELS], then[3], share = 1.0f;\n{gather}{call}"
 
     def efforts(off: Any, heading: Any, twist: Any, velocity: Any, total: Any) -> dict[str, Any]:
         return _named(controller.effort(controller.aim(off, heading, twist, velocity), total))
@@ -431,6 +458,36 @@ if (limited) { /* at a limit, nothing is added to the sum */
 }
 """
 
+# Of a drive with a speed loop, `Pid._commanded`.
+_LOOP_MEMORY = """
+    float loop[OMNIDYN_WHEELS], mean[OMNIDYN_WHEELS], reached[3];
+    int driven;"""
+
+_COMMANDED = """
+elapsed = elapsed < @LONGEST@ ? elapsed : @LONGEST@;
+for (k = 0; k < OMNIDYN_WHEELS; k++) {
+    self->loop[k] = self->driven ? self->loop[k] + elapsed * (self->last[k] - self->mean[k]) : 0.0f;
+}
+for (k = 0; k < 3; k++) {
+    self->reached[k] = self->driven ? self->reached[k] : twist[k];
+    more[k] = self->sum[k] + off[k] * elapsed;
+}
+self->driven = 1;
+commands(off, pose[2], (const float(*)[3])velocity, more, 1.0f, self->reached, self->loop, output, self->mean, volts,
+         then);
+for (k = 0; k < OMNIDYN_WHEELS; k++) {
+    share = fabsf(volts[k]) / VOLTAGE_LIMIT[k] <= share ? share : fabsf(volts[k]) / VOLTAGE_LIMIT[k];
+}
+limited = !(share <= 1.0f);
+if (limited) { /* slower, and nothing is added to the sum */
+    memcpy(more, self->sum, sizeof(more));
+    commands(off, pose[2], (const float(*)[3])velocity, more, share, self->reached, self->loop, output, self->mean,
+             volts, then);
+}
+memcpy(self->sum, more, sizeof(more));
+memcpy(self->reached, then, sizeof(then));
+"""
+
 _STEP = """
 /* Whether all of n numbers are finite, and none is beyond what a place or a speed can be. */
 static int sane(const float *values, int n)
@@ -447,7 +504,7 @@ static int sane(const float *values, int n)
 /* Zeros, and why. */
 static int safe(omnidyn_control *self, float output[OMNIDYN_WHEELS], int why)
 {
-    int k;
+    int k;@STOPS@
     for (k = 0; k < OMNIDYN_WHEELS; k++) {
         self->last[k] = output[k] = 0.0f;
     }
@@ -475,7 +532,7 @@ void omnidyn_control_reset(omnidyn_control *self)
     for (k = 0; k < OMNIDYN_WHEELS; k++) {
         self->last[k] = 0.0f;
     }
-    self->begun = self->missing = 0;
+    self->begun = self->missing = 0;@STOPS@
 #if LATE_ROWS
     memset(&self->late, 0, sizeof(self->late));
 #endif

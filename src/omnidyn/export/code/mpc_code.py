@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.control.controller import LARGEST_STATE, LATEST, MOST_BRIDGED, WHEEL_SPEED
+from omnidyn.control.controller import LARGEST_STATE, LATEST, MOST_BRIDGED
 from omnidyn.control.mpc import interior_point, loop, observer, program
 from omnidyn.control.mpc.controller import LONGEST, Mpc
 from omnidyn.control.mpc.model import (
@@ -21,6 +21,9 @@ from omnidyn.control.mpc.model import (
     PHI,
     PSI,
     SOFT_SPEED,
+    SUM,
+    SUM_DRIVE,
+    SUM_TWIST,
     TERMS,
     TURNING,
     volts,
@@ -28,7 +31,6 @@ from omnidyn.control.mpc.model import (
 from omnidyn.control.mpc.settings import Settings
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.spelling import c_number, filled
-from omnidyn.model.wheels import wheel_speed
 
 FOLDER = files("omnidyn.export.code") / "mpc"
 PARTS = ("model.c", "solver.c", "step.c")
@@ -113,7 +115,7 @@ _SWITCHES = """
 
 def _bounded(controller: Mpc) -> bool:
     """Whether the bounds of the volts are others in each step."""
-    limit = volts(controller.robot)
+    limit = volts(controller.driven)
     return controller.robot_settings.slew is not None or _current(controller) or bool(np.any(limit != limit[0]))
 
 
@@ -135,7 +137,7 @@ def _constants(controller: Mpc) -> str:
         "BOUNDED": _bounded(controller),
         "CURRENT": _current(controller),
         "SLEW": settings.slew is not None,
-        "WHEEL_SPEED": controller.output == WHEEL_SPEED,
+        "SUM": linear[SUM] != 0.0,
         "LATE_STEPS": controller.steps_late,
         "PASSES": observer.PASSES,
         "TERMS": TERMS,
@@ -188,7 +190,12 @@ def _constants(controller: Mpc) -> str:
     lines += [f"#define {name} {c_number(float(value), True)}" for name, value in numbers.items()]
     matrices = _matrices(controller, linear) | ({"FRAME": _square(linear, TURNING)} if turning else {})
     matrices |= {"BY_MASS": _square(linear, BY_MASS)} if ellipse else {}
-    matrices |= _outputs(controller, robot)
+    matrices |= (
+        {"SUM_DRIVE": _square(linear, SUM_DRIVE), "SUM_TWIST": _square(linear, SUM_TWIST)} if linear[SUM] else {}
+    )
+    if _current(controller):
+        limit, emf = controller.robot_settings.tables(controller.driven, controller.dt, True)[2:4]
+        matrices |= {"CURRENT_VOLTS": limit[1], "EMF": emf}
     tables = [_table(name, np.asarray(matrix, float)) for name, matrix in matrices.items()]
     tables += [_by_wheel(name, column) for name, column in _wheels(controller).items()]
     return "\n".join([*lines, "", *tables])
@@ -219,23 +226,10 @@ def _noise(settings: Settings) -> dict[str, Any]:
     }
 
 
-def _outputs(controller: Mpc, robot: Any) -> dict[str, Any]:
-    """Tables of optional limits, and of how twists become speeds of wheels."""
-    settings, tables = controller.robot_settings, dict[str, Any]()
-    if controller.output == WHEEL_SPEED:
-        tables["SPEED_OF"] = np.array([wheel_speed(robot.wheels, axis) for axis in np.eye(3)]).T
-    if _current(controller):
-        limit, emf = settings.tables(robot, controller.dt, True)[2:4]
-        tables |= {"CURRENT_VOLTS": limit[1], "EMF": emf}
-    return tables
-
-
 def _wheels(controller: Mpc) -> dict[str, np.ndarray]:
     """What each wheel has one of: limits, and how volts become what the drive takes."""
-    robot, per_volt = controller.robot, np.full(controller.robot.wheels.count, controller._per_volt)
-    if controller.output == WHEEL_SPEED:
-        per_volt = 0.0 * per_volt if np.any(robot.drive.ki) else 0.0 * per_volt + 1.0 / np.asarray(robot.drive.kp)
-    return {"VOLTAGE_LIMIT": volts(robot), "OUTPUT_LIMIT": controller.limit, "PER_VOLT": per_volt}
+    per_volt = controller.per_volt * np.ones(controller.robot.wheels.count)
+    return {"VOLTAGE_LIMIT": volts(controller.driven), "OUTPUT_LIMIT": controller.limit, "PER_VOLT": per_volt}
 
 
 def _by_wheel(name: str, values: np.ndarray) -> str:

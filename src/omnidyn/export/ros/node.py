@@ -84,7 +84,7 @@ def ros2_node(
     sources = ()
     if controller:
         files, sources = follower(robot, controller, dt, timeout, about), ("omnidyn_control.c", "control_shared.c")
-        notes = (*notes, BUILD)
+        notes = (*notes, BUILD, *map(str, robot.pose_lag_of_log))
     else:
         loop = _LOOP + (_TO_SPEEDS if is_loop else _TO_DUTIES)
         files = {"drive_loop.py": about + _constants(robot, 1.0 / dt, timeout) + NUMBERS + loop}

@@ -536,10 +536,9 @@ def _effects(
 
 
 def _added_up(run: Run, latency_by_channel: Mapping[str, float]) -> bool:
-    """Whether the wheel speeds of a run were fitted as the angles that they add up to."""
-    return (
-        "wheel_angle" in latency_by_channel and run.wheel_angle is None and run.wheel_speed is not None and len(run) > 1
-    )
+    """Whether wheel speeds of a run are those of counts: its angles, or what its speeds add up to, are fitted."""
+    one_of_both = (run.wheel_angle is None) != (run.wheel_speed is None)
+    return "wheel_angle" in latency_by_channel and one_of_both and len(run) > 1
 
 
 def loss_words(loss: str) -> str:

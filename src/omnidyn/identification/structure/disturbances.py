@@ -17,16 +17,16 @@ from omnidyn.identification.output_error.linear.motion import Motion, in_the_roo
 from omnidyn.model.layout import N_AXES, YAW
 
 Directions = Callable[[Motion, FloatArray], FloatArray]  # of a motion and its fastest twist (3,)
+Sensors = Sequence[tuple[str, int]]  # (channel, component) of all that the logs show
 
 
 @dataclass(frozen=True)
 class Theme:
-    """name: what the misfit follows, in words people read. directions: forces (n, K, 3), or what columns show
-    (C, n, K) where `sensed`."""
+    """name: what the misfit follows, in words people read. directions: forces (n, K, 3); None of what is no force:
+    what sensors show by themselves."""
 
     name: str
-    directions: Directions
-    sensed: bool = False
+    directions: Directions | None
 
 
 def _on_axes(values: list[tuple[int, FloatArray]]) -> FloatArray:
@@ -146,16 +146,16 @@ def _angles(motion: Motion, top: FloatArray) -> FloatArray:
     )
 
 
-def _sensors(motion: Motion, top: FloatArray) -> FloatArray:
-    """Sensors that show more or less, later or one-sided: each column by itself. Shape (C, n, K)."""
+def _sensors(motion: Motion, sensors: Sensors) -> FloatArray:
+    """Sensors that show more or less, later or one-sided: each by itself, also one of other logs. Shape (C, n, K)."""
     speed, dt = motion.shown(motion.twist[:, None, :])[:, :, 0], np.diff(motion.t)
-    count = len(speed)
-    columns = np.zeros((count, len(motion.t), 4 * count))
-    for c, values in enumerate(speed):
+    columns = np.zeros((len(speed), len(motion.t), 4 * len(sensors)))
+    for c, (sensor, values) in enumerate(zip(motion.piece.record.columns, speed, strict=True)):
+        first = 4 * sensors.index(sensor)
         pace = np.zeros_like(values)
         pace[1:-1] = (values[2:] - values[:-2]) / (dt[1:] + dt[:-1])
         largest_value = max(float(np.abs(values).max()), 1e-12)
-        columns[c, :, 4 * c : 4 * c + 4] = np.stack(
+        columns[c, :, first : first + 4] = np.stack(
             [values, pace, np.abs(values), values * np.abs(values) / largest_value], axis=1
         )
     return columns
@@ -171,14 +171,16 @@ THEMES = (
     Theme("the time in the log", _time),
     Theme("the heading in the room", lambda motion, _: in_the_room(motion)),
     Theme("the angle of the wheels", _angles),
-    Theme("what each sensor shows", _sensors, sensed=True),
+    Theme("what each sensor shows", None),
 )
 
 
-def shown_by_themes(motion: Motion, top: FloatArray, themes: Sequence[Theme] = THEMES) -> tuple[FloatArray, list[int]]:
+def shown_by_themes(
+    motion: Motion, top: FloatArray, sensors: Sensors, themes: Sequence[Theme] = THEMES
+) -> tuple[FloatArray, list[int]]:
     """(what all directions of all themes show of a motion (C, n, K), how many of the K each theme has)."""
-    forces = [theme.directions(motion, top) for theme in themes if not theme.sensed]
+    forces = [theme.directions(motion, top) for theme in themes if theme.directions is not None]
     ends = np.cumsum([force.shape[1] for force in forces])[:-1]
     force_columns = iter(np.split(motion.shown_by(np.concatenate(forces, axis=1)), ends, axis=2) if forces else ())
-    columns = [theme.directions(motion, top) if theme.sensed else next(force_columns) for theme in themes]
+    columns = [_sensors(motion, sensors) if theme.directions is None else next(force_columns) for theme in themes]
     return np.concatenate(columns, axis=2), [column.shape[2] for column in columns]

@@ -62,7 +62,8 @@ class Misfit:
 def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEMES) -> Misfit:
     """Test every theme, step by step: what is found first is part of the model when the rest is tested."""
     top = np.maximum(np.max([np.abs(m.twist).max(axis=0) for m in motions], axis=0), 1e-9)
-    columns_and_ends = [shown_by_themes(motion, top, themes) for motion in motions]
+    sensors = list(dict.fromkeys(sensor for motion in motions for sensor in motion.piece.record.columns))
+    columns_and_ends = [shown_by_themes(motion, top, sensors, themes) for motion in motions]
     columns_by_piece, ends = [columns for columns, _ in columns_and_ends], np.cumsum([0, *columns_and_ends[0][1]])
     columns_by_theme = {theme.name: np.arange(a, b) for theme, a, b in zip(themes, ends, ends[1:], strict=False)}
     found_themes: list[Found] = []

@@ -21,10 +21,11 @@ from omnidyn.logs.columns.component import (
 )
 from omnidyn.logs.columns.frame_of import FRAMES
 from omnidyn.logs.columns.guess_time import take_time
-from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, settle_side, take_sides, unit_of
+from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, settle_side, take_sides, unit_of, voltage_limit
 from omnidyn.logs.columns.guessed import Doubt, Guess, doubt, first_word, floats, is_numeric, joined_doubts, letter_of
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import BRACKETS, read_name
+from omnidyn.logs.columns.plausible import beyond_range
 from omnidyn.logs.columns.wheel_numbers import BY_PLACES, proposed_wheels, wheel_numbers
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
@@ -115,10 +116,20 @@ def _take_said(table: Table, assumed: Mapping[str, str], guess: Guess) -> None:
         if declaration.why is not None:
             guess.doubts.append(doubt(name, declaration.component, declaration.why.code, (), **declaration.why.numbers))
         elif declaration.component and declaration.component not in guess.columns:
-            if declared_unit or not (fast := doubt_of_rate(table, name, declaration.component, unit)):
+            unlikely = None if declared_unit else _unlikely(table, name, declaration.component, unit, guess.robot)
+            if unlikely is None:
                 guess.columns[declaration.component] = Column(name, unit)
             else:
-                guess.doubts.append(fast)
+                guess.doubts.append(unlikely)
+
+
+def _unlikely(table: Table, name: str, component: str, unit: str, robot: Robot | None) -> Doubt | None:
+    """The doubt about a column whose values are not what the format says that they are; None where they can be."""
+    if place(component) is None or isinstance(table.columns[name], tuple):
+        return None
+    fast = doubt_of_rate(table, name, component, unit)
+    of_range = beyond_range(component, parse_unit(unit), floats(table.columns[name]), voltage_limit(robot))
+    return fast or (of_range and replace(of_range, columns=(name,)))
 
 
 def _meant(name: str, names: Iterable[str]) -> list[str]:
@@ -236,9 +247,10 @@ def _enter(table: Table, name: str, component: str, unit: Unit, is_declared: boo
         if unit.quantity != TIME_UNIT or component not in ("x", "y", "heading"):  # x [s] is the axis of a picture
             guess.doubts.append(doubt(name, component, "unit_of_other", unit=unit.text, quantity=quantity))
         return
-    unlikely = implausible(component, unit, floats(table.columns[name]), is_declared, guess.robot)
+    unlikely = implausible(component, unit, floats(table.columns[name]), is_declared, name not in guess.si, guess.robot)
     if unlikely is not None:
         guess.doubts.append(replace(unlikely, columns=(name,), components=(doubted_component,)))
+        guess.si.pop(name, None)
         return
     roles = read_name(name).roles
     side = MOTOR_SIDE if component_channel(component) in SIDED and words.MOTOR in roles else WHEEL_SIDE

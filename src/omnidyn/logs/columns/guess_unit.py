@@ -13,12 +13,12 @@ from omnidyn.logs.channels import si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
 from omnidyn.logs.columns.guessed import Doubt, Guess, doubt, floats
 from omnidyn.logs.columns.mapping import SIDED, component_channel, quantity_of
+from omnidyn.logs.columns.plausible import MOST_VOLTS, VOLTS, beyond_range, likely_units
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.units import ANGLE, Unit, parse_unit
 
-MOST_VOLTS = 100.0  # [V] of a motor's driver; more are steps of a converter
 MOST_DUTY = 4.0  # what a sum of sticks asks for is clipped by the driver; more is no duty
 PERCENT, MOST_PERCENT = ("%", "pct", "percent"), 105.0
 FAR_BEYOND = 4.0  # times the limit of a robot: more are no volts
@@ -48,28 +48,38 @@ def unit_of(table: Table, name: str, component: str, robot: Robot | None, guess:
     return parse_unit(guess.si[name])
 
 
-def implausible(component: str, unit: Unit, values: FloatArray, is_declared: bool, robot: Robot | None) -> Doubt | None:
+def implausible(
+    component: str, unit: Unit, values: FloatArray, is_declared: bool, is_given: bool, robot: Robot | None
+) -> Doubt | None:
     """The doubt, of no column yet, about values that cannot be in their unit; None where they can.
 
-    is_declared: whether the user said the unit: what is only unlikely is then believed.
+    is_declared: whether the user said the unit: what is only unlikely is then believed. is_given: whether the file did.
     """
     if quantity_of(component) == ANGLE and unit == parse_unit("rad") and not is_declared and _turns_in_degrees(values):
         return doubt("", component, "turns_in_degrees", ("deg",), unit="rad")
     if component[0] not in "ud" or not component[1:].isdigit():
-        return None
+        return None if is_declared else beyond_range(component, unit, values, voltage_limit(robot), is_given)
     largest = _largest(values)
     if component[0] == "u":
         limit = _most_volts(robot)
         code, numbers = "too_many_volts", {"largest": largest, "unit": unit.text, "most_V": limit}
+        units = (*_millivolts(largest), *_scales(largest))
     else:
         limit = 1.0 if unit.text in PERCENT and largest > MOST_PERCENT and _are_whole(values) else MOST_DUTY
         code, numbers = "too_much_duty", {"largest": largest, "unit": unit.text if unit.text in PERCENT else ""}
-    return doubt("", component, code, _scales(largest), **numbers) if largest * unit.size > limit else None
+        units = _scales(largest)
+    return doubt("", component, code, units, **numbers) if largest * unit.size > limit else None
 
 
 def _most_volts(robot: Robot | None) -> float:
     """The most that can be volts of a motor: far beyond the limit of the robot, where there is one."""
-    return MOST_VOLTS if robot is None else min(MOST_VOLTS, FAR_BEYOND * _limit(robot))
+    limit = voltage_limit(robot)
+    return MOST_VOLTS if limit is None else min(MOST_VOLTS, FAR_BEYOND * limit)
+
+
+def _millivolts(largest: float) -> tuple[str, ...]:
+    """That unit, where volts of a motor are so many of it; hundredths of a volt are steps of a converter rather."""
+    return tuple(unit for unit in likely_units(VOLTS, largest) if unit == "mV")
 
 
 def _scales(largest: float) -> tuple[str, ...]:
@@ -132,7 +142,8 @@ def _command_unit(table: Table, name: str, component: str, robot: Robot | None, 
     if component.startswith("u") and 1.0 < largest <= MOST_VOLTS and spoken:
         guess.note("taken_as_volts", column=name)
         return parse_unit("V")
-    if component.startswith("u") and robot is not None and 1.0 < largest <= 1.05 * _limit(robot):
+    limit = voltage_limit(robot)
+    if component.startswith("u") and limit is not None and 1.0 < largest <= 1.05 * limit:
         guess.note("taken_as_volts", column=name, largest=largest)
         return parse_unit("V")
     alike = [column_name for column_name in table.names if re.sub(r"\d+", "", column_name) == re.sub(r"\d+", "", name)]
@@ -145,12 +156,19 @@ def _command_unit(table: Table, name: str, component: str, robot: Robot | None, 
         return None
     scales = _scales(largest)
     volts = ("V",) * (largest <= _most_volts(robot))
+    if component.startswith("u") and not volts:
+        if spoken:
+            units = likely_units(VOLTS, largest)
+            guess.doubts.append(doubt(name, component, "beyond_range", units, size=largest, unit="", of="u"))
+            return None
+        volts = _millivolts(largest)
     guess.doubts.append(doubt(name, component, "command_without_unit", (*volts, *scales), largest=largest))
     return None
 
 
-def _limit(robot: Robot) -> float:
-    return float(np.max(per_wheel(robot.motor.voltage_limit, robot.wheels.count)))
+def voltage_limit(robot: Robot | None) -> float | None:
+    """The most that the driver of a robot gives to a motor [V]; None of no robot."""
+    return None if robot is None else float(np.max(per_wheel(robot.motor.voltage_limit, robot.wheels.count)))
 
 
 # Guess on which side of the gear the speeds and angles of wheels are: what the commands say, or the user

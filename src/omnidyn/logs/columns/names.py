@@ -13,7 +13,7 @@ import numpy as np
 from omnidyn.logs.table.dialect import MAX_NAME
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import MAX_WHEELS, MIN_WHEELS, per_wheel
-from omnidyn.units import Unit, known_unit
+from omnidyn.units import MAX_TEXT, Unit, known_unit
 
 (
     TIME,
@@ -204,7 +204,7 @@ def _number(text: str) -> tuple[int | None, str]:
 def _split_unit(name: str) -> tuple[str, Unit | None]:
     """A unit at the end of a name, as in w1_rad_s, i1_mA, motor_1_rpm or ticks_per_s; the longest that is one."""
     parts = re.split(r"_", name)
-    for first in range(1, len(parts)):
+    for first in range(max(1, len(parts) - MAX_TEXT), len(parts)):  # no unit has more parts than letters
         tail = "_".join(parts[first:])
         if re.search(r"(^|\D)\d\d?$", tail):  # the 2 of current_mA_2 is a wheel, no divisor
             continue

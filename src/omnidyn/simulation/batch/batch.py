@@ -14,6 +14,7 @@ from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.batch.blocks import EXACT_POSE, FAST_POSE, BatchCommands, BlockGroup, GroupRun, drivers_of
 from omnidyn.simulation.batch.choice import DUTY, EXACT, GENERAL, VOLTAGE, WHEEL_SPEED, engine_kind
+from omnidyn.simulation.batch.loops import LoopGroup
 from omnidyn.simulation.batch.parameters import batch_parameters, wheels_of
 from omnidyn.simulation.batch.result import BatchRun, BatchState, Statistics
 from omnidyn.simulation.batch.singles import SingleGroup
@@ -125,7 +126,7 @@ class Batch:
     def _group(self, robots: Sequence[Robot] | Sample, dtype: Any, tol: float | None) -> list[tuple[IntArray, Any]]:
         """(indices, the group that moves those robots), one for each engine."""
         parameters = getattr(robots, "parameters", None)
-        if parameters is not None:
+        if parameters is not None and self.command != WHEEL_SPEED:
             center: Robot = robots.center  # pyright: ignore[reportAttributeAccessIssue]
             kind = engine_kind(center, self.command, tol)
             if kind == EXACT or (kind != GENERAL and np.array_equal(parameters.coulomb, parameters.breakaway)):
@@ -149,6 +150,8 @@ class Batch:
             members = [fleet[k] for k in index]
             if kind == GENERAL:
                 group: Any = SingleGroup(members, self.command, self._supply, self.dt, self.pose, tol)
+            elif self.command == WHEEL_SPEED:
+                group = LoopGroup(kind, members, self.dt, self.pose, dtype)
             else:
                 turning = np.array([robot.body.rotating_frame for robot in members])
                 parameters = batch_parameters(members)

@@ -20,12 +20,9 @@ def engine_kind(robot: Robot, command: str, tol: float | None) -> str:
 
     command: what is given. tol [m/s]: of an engine that is not exact, None for one fixed step a row.
     """
-    drive = robot.drive
-    if command == WHEEL_SPEED or (command == DUTY and drive.coasts) or drive.latency > 0.0:
+    if (command == DUTY and robot.drive.coasts) or robot.motor.electrical == DYNAMIC:
         return GENERAL
-    if robot.motor.electrical == DYNAMIC:
-        return GENERAL
-    if not why_not_exact(robot):
+    if command != WHEEL_SPEED and not why_not_exact(robot):
         return EXACT
     shape = _shape(robot.friction)
     if tol is not None or shape == GENERAL or why_not_exact(_on_axes(robot)):
@@ -38,15 +35,17 @@ def _shape(friction: Friction) -> str:
     axes, way = friction.axes, friction.direction
     bare = DirectionFriction(
         coulomb=way.coulomb,
+        breakaway=way.coulomb,
         viscous=way.viscous,
         yaw_coulomb=way.yaw_coulomb,
+        yaw_breakaway=way.yaw_coulomb,
         yaw_viscous=way.yaw_viscous,
         ellipse=way.ellipse,
     )
-    levels = {"breakaway": way.coulomb, "yaw_breakaway": way.yaw_coulomb}
     if friction.wheels != WheelFriction() or not axes.is_plain or axes.breakaway not in (None, axes.coulomb):
         return GENERAL
-    if way.replace(**levels) != bare.replace(**levels):
+    held = way.breakaway or way.coulomb, way.yaw_coulomb if way.yaw_breakaway is None else way.yaw_breakaway
+    if way.replace(breakaway=held[0], yaw_breakaway=held[1]) != bare:
         return GENERAL
     if way.coulomb == (0.0, 0.0):
         return BOX

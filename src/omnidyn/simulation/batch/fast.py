@@ -17,41 +17,54 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import inlined, kernel
-from omnidyn.simulation.batch.exact import BREAKAWAY, COULOMB, PER_VOLT, PHI, RATE, put_drive, put_shared_drive
-from omnidyn.simulation.batch.march import DRIVE, POSE, SPEED, TOTALS, first_failure, keep, load, spoil, store
-from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters, in_blocks
+from omnidyn.simulation.batch.exact import BREAKAWAY, COULOMB, PER_VOLT, PHI, RATE, exact_law, put_drive, put_shared_drive
+from omnidyn.simulation.batch.march import (
+    DRIVE,
+    POSE,
+    SPEED,
+    TOTALS,
+    first_failure,
+    hand_over,
+    keep,
+    load_all,
+    shows,
+    spoil,
+    store,
+    whole_steps,
+)
+from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters
 from omnidyn.simulation.exact.step import course, exact_step
 
-FIRST, SECOND, END, TURN, NODE_PHI, LAW = (
-    12,
-    15,
-    18,
-    21,
-    22,
-    28,
-)  # rows of `work`: speeds at the nodes and the end, turn
+# Rows of `work`: speeds at the nodes and the end, turn; from SHARE on what a step of its length takes.
+FIRST, SECOND, END, TURN, SHARE, NODE_PHI, LAW = 12, 15, 18, 21, 22, 23, 29
 # sin x = x (1 - x^2/6 (1 - x^2/20 (1 - x^2/42))), cos x = 1 - x^2/2 (1 - x^2/12 (1 - x^2/30)): 1e-10 up to 0.3 rad
 SERIES = (1 / 6, 1 / 20, 1 / 42, 1 / 2, 1 / 12, 1 / 30)
 
 
+NODES = 0.5 + np.array([-1.0, 1.0]) / np.sqrt(12.0)
+
+
 class GaussTwo(NamedTuple):
-    """The rule of a fast pose. phi (blocks, 6, WIDTH) [s]: of the time of each node, 3 axes each.
+    """The rule of a fast pose. numbers: SERIES, then 1, 3/2, h/2, of each node its time and its square over 2 h [s],
+    1/3, 1/4 and h; in the type of the batch."""
 
-    numbers: SERIES, then 1, 3/2, h/2, of each node its time and its square over 2 h [s], 1/3, 1/4 and h; in the type of
-    the batch.
-    """
-
-    phi: NDArray[Any]
     numbers: NDArray[Any]
 
 
-def gauss_two(parameters: BatchParameters, dt: float, dtype: Any) -> GaussTwo:
+def gauss_two(dt: float, dtype: Any) -> GaussTwo:
     """The rule of steps of dt [s]."""
-    times, rate = dt * (0.5 + np.array([-1.0, 1.0]) / np.sqrt(12.0)), parameters.damping / parameters.mass
-    phi = np.concatenate([-np.expm1(-rate * time) / rate for time in times])
+    times = dt * NODES
     numbers = [*SERIES, 1.0, 1.5, dt / 2.0, *times, *(times**2 / (2.0 * dt)), 1.0 / 3.0, 0.25, dt]
-    return GaussTwo(in_blocks(phi, dtype), np.array(numbers, dtype))
+    return GaussTwo(np.array(numbers, dtype))
+
+
+def fast_law(parameters: BatchParameters, length: FloatArray, dt: float) -> FloatArray:
+    """The laws of robots under steps of `length` [s], (n,): that as a share of dt, phi of the nodes, `exact_law`."""
+    rate = parameters.damping / parameters.mass
+    phi = [-np.expm1(-rate * (length * node)) / rate for node in NODES]
+    return np.concatenate([length[None] / dt, *phi, exact_law(parameters, length)])
 
 
 @inlined
@@ -118,17 +131,18 @@ def _turn(work, k, zero):
         work[SECOND + 2],
         work[END + 2],
     )
-    turn, half, one, half_dt, third, quarter, dt = work[TURN], k[3], k[6], k[8], k[13], k[14], k[15]
+    turn, share, half, one, half_dt = work[TURN], work[SHARE], k[3], k[6], k[8]
+    third, quarter, dt = k[13], k[14], k[15]
     for n in range(WIDTH):
         mirrored, x, q, _, rests, crosses, reverses = course(v[n], g[n], c[n], s[n], a[n], phi[n], zero)
         stops = crosses & (not rests)
         rough = x / (c[n] - q if stops else one)
         y = a[n] * rough
         event = rough * (one - y * (half - y * (third - y * quarter)))
-        after = (q + c[n]) * (dt - event) if reverses else zero
+        after = (q + c[n]) * (dt * share[n] - event) if reverses else zero
         closed = (x + (q - c[n]) * event + after - (-end[n] if mirrored else end[n])) / a[n]
         closed = -closed if mirrored else closed
-        turn[n] = closed if stops else half_dt * (first[n] + second[n])
+        turn[n] = closed if stops else half_dt * share[n] * (first[n] + second[n])
 
 
 @inlined
@@ -138,13 +152,13 @@ def _move_on(work, k):
     vx, vy, w = work[SPEED], work[SPEED + 1], work[SPEED + 2]
     x1, y1, x2, y2, turn = work[FIRST], work[FIRST + 1], work[SECOND], work[SECOND + 1], work[TURN]
     ex, ey, ew, more, half_dt = work[END], work[END + 1], work[END + 2], k[7], k[8]
-    half = k[3]
+    half, share = k[3], work[SHARE]
     for n in range(WIDTH):
         change = ew[n] - w[n]
-        cos1, sin1 = _rotation(k[9] * w[n] + k[11] * change, k)
-        cos2, sin2 = _rotation(k[10] * w[n] + k[12] * change, k)
-        dx = half_dt * (cos1 * x1[n] - sin1 * y1[n] + cos2 * x2[n] - sin2 * y2[n])
-        dy = half_dt * (sin1 * x1[n] + cos1 * y1[n] + sin2 * x2[n] + cos2 * y2[n])
+        cos1, sin1 = _rotation((k[9] * w[n] + k[11] * change) * share[n], k)
+        cos2, sin2 = _rotation((k[10] * w[n] + k[12] * change) * share[n], k)
+        dx = half_dt * share[n] * (cos1 * x1[n] - sin1 * y1[n] + cos2 * x2[n] - sin2 * y2[n])
+        dy = half_dt * share[n] * (sin1 * x1[n] + cos1 * y1[n] + sin2 * x2[n] + cos2 * y2[n])
         cos, sin = cosine[n], sine[n]
         x[n] += cos * dx - sin * dy
         y[n] += sin * dx + cos * dy
@@ -159,29 +173,33 @@ def _move_on(work, k):
 @kernel
 def march_fast(first, last, laws, rows, record, rule):
     """Move blocks first..last through all rows of volts, with fast poses."""
-    volts, states, fails = rows
-    _, steps, wheels, width = volts.shape
-    zero, after = laws.dtype.type(0), LAW + laws.shape[1]
-    work, sums = np.zeros((after, WIDTH), laws.dtype), np.zeros((TOTALS * 6, WIDTH), laws.dtype)
-    drive, law = work[DRIVE:POSE], work[LAW:after]
+    volts, states, fails, fresh = rows
+    pieces, wheels, width = len(states), volts.shape[2], volts.shape[3]
+    steps, zero, after = volts.shape[1] - pieces + 1, laws.dtype.type(0), SHARE + laws.shape[2]
+    tables, sums = np.zeros((pieces, after, WIDTH), laws.dtype), np.zeros((TOTALS * 6, WIDTH), laws.dtype)
     for b in range(first, last):
-        load(work, LAW, laws[b], states[b])
-        for i in range(6):
-            for n in range(WIDTH):
-                work[NODE_PHI + i, n] = rule.phi[b, i, n]
+        load_all(tables, SHARE, laws, states, fresh, b)
         failure = first_failure(fails[b])
         for k in range(steps):
-            if width == 1 and wheels == 3:
-                _speeds_of_three(work, volts[0, k, 0, 0], volts[0, k, 1, 0], volts[0, k, 2, 0], zero)
-            else:
-                if width > 1:
-                    put_drive(drive, law, volts[b - first, k])
+            for piece in range(pieces if shows(record, k, steps) else 1):
+                if piece > 0:
+                    hand_over(tables, 9)
+                work, at = tables[piece], k + piece
+                if width == 1 and wheels == 3:
+                    _speeds_of_three(work, volts[0, at, 0, 0], volts[0, at, 1, 0], volts[0, at, 2, 0], zero)
                 else:
-                    put_shared_drive(drive, law, volts[0, k, :, 0])
-                _speeds(work, zero)
-            _turn(work, rule.numbers, zero)
-            _move_on(work, rule.numbers)
-            if k >= failure:
-                spoil(work, 6, fails[b], k)
-            keep(work, k, steps, b, record, sums, 6)
-        store(states[b], work)
+                    drive, law = work[DRIVE:POSE], work[LAW:after]
+                    if width > 1:
+                        put_drive(drive, law, volts[b - first, at])
+                    else:
+                        put_shared_drive(drive, law, volts[0, at, :, 0])
+                    _speeds(work, zero)
+                _turn(work, rule.numbers, zero)
+                _move_on(work, rule.numbers)
+                if k >= failure:
+                    spoil(work, 6, fails[b], k)
+            if k == 0 and pieces > 1:
+                whole_steps(tables, SHARE, laws, fresh, b)
+            keep(tables[pieces - 1], k, steps, b, record, sums, 6)
+        for piece in range(pieces):
+            store(states[piece, b], tables[piece])

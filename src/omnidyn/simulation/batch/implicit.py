@@ -25,13 +25,26 @@ from numpy.typing import NDArray
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import inlined, kernel, part
-from omnidyn.simulation.batch.march import DRIVE, POSE, SPEED, TOTALS, first_failure, keep, load, spoil, store
+from omnidyn.simulation.batch.march import (
+    DRIVE,
+    POSE,
+    SPEED,
+    TOTALS,
+    first_failure,
+    hand_over,
+    keep,
+    load_all,
+    shows,
+    spoil,
+    store,
+    whole_steps,
+)
 from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters
-from omnidyn.simulation.batch.pose import ALONE, DX, DY, END, HALF, NODE, ONE, SERIES, TURN, move_on, rotation
+from omnidyn.simulation.batch.pose import ALONE, DX, DY, END, HALF, NODE, ONE, SERIES, SHARE, TURN, move_on, rotation
 from omnidyn.simulation.exact.march import PIECE
 from omnidyn.simulation.implicit.step import BACK, GAMMA
 
-LAW = 23  # rows of `work`, after those of pose.py
+LAW = SHARE + 1  # rows of `work`, after those of pose.py
 COULOMB, DAMPING, MASS, TURNING, PUSH = 0, 3, 6, 9, 10  # rows of a law
 LENGTH_ERROR = {"float64": 1e-13, "float32": 1e-5}  # of n, from which on a robot goes alone
 BISECTIONS = 200
@@ -60,6 +73,11 @@ def implicit_law(parameters: BatchParameters, turning: NDArray[np.bool_]) -> Flo
     frame_mass = np.where(turning, parameters.body_mass, 0.0)[None]
     push = parameters.push.reshape(-1, parameters.count)
     return np.concatenate([parameters.coulomb, parameters.damping, parameters.mass, frame_mass, push])
+
+
+def with_share(law: FloatArray, length: FloatArray, dt: float) -> FloatArray:
+    """The laws under steps of `length` [s], (n,): that as a share of dt stands before them."""
+    return np.concatenate([length[None] / dt, law])
 
 
 @inlined
@@ -148,7 +166,7 @@ def _ellipse_alone(bx, by, cx, cy, dx, dy, turn, tau):
 @inlined
 def put_stage(work, to, back, box, k, zero):
     """Fill rows `to`... with the speeds at the end of a stage whose x* is start + back (stage 1 - start)."""
-    tau, ends = k[TAU], work[ALONE]
+    whole, ends, share = k[TAU], work[ALONE], work[SHARE]
     vx, vy, vw, px, py, pw = (
         work[SPEED],
         work[SPEED + 1],
@@ -169,6 +187,7 @@ def put_stage(work, to, back, box, k, zero):
     )
     mx, my, mw, m = work[LAW + MASS], work[LAW + MASS + 1], work[LAW + MASS + 2], work[LAW + TURNING]
     for n in range(WIDTH):
+        tau = whole * share[n]
         goal = vw[n] + back * (pw[n] - vw[n])
         tw[n] = _soft(mw[n] * goal + tau * fw[n], tau * cw[n], zero) / (mw[n] + tau * dw[n])
         turn[n] = tau * m[n] * tw[n]
@@ -176,37 +195,40 @@ def put_stage(work, to, back, box, k, zero):
         by[n] = my[n] * (vy[n] + back * (py[n] - vy[n])) + tau * fy[n]
     if box:
         for n in range(WIDTH):
+            tau = whole * share[n]
             axx, ayy = mx[n] + tau * dx[n], my[n] + tau * dy[n]
             tx[n], ty[n] = _box(bx[n], by[n], tau * cx[n], tau * cy[n], axx, ayy, turn[n], zero)
     else:
         for n in range(WIDTH):
+            tau = whole * share[n]
             axx, ayy = mx[n] + tau * dx[n], my[n] + tau * dy[n]
             tx[n], ty[n], ends[n] = _ellipse(bx[n], by[n], cx[n], cy[n], axx, ayy, turn[n], tau, k, zero)
         for n in range(WIDTH):
             if ends[n] > k[ERROR]:
+                tau = whole * share[n]
                 axx, ayy = mx[n] + tau * dx[n], my[n] + tau * dy[n]
                 tx[n], ty[n] = _ellipse_alone(bx[n], by[n], cx[n], cy[n], axx, ayy, turn[n], tau)
 
 
 @inlined
-def _advance_pose(work, k):
+def advance_pose(work, k):
     """The pose after a step, from the speeds at the ends of its stages: `advance_pose` of the scalar engine."""
     late, early, angle = k[LATE], k[EARLY], k[ANGLE]
     x1, y1, w1, x2, y2, w2 = work[NODE], work[NODE + 1], work[NODE + 2], work[END], work[END + 1], work[END + 2]
-    dx, dy, turn, most = work[DX], work[DY], work[TURN], work[ALONE]
+    dx, dy, turn, most, share = work[DX], work[DY], work[TURN], work[ALONE], work[SHARE]
     for n in range(WIDTH):
-        first, total = late * w1[n], early * w1[n] + late * w2[n]
+        first, total = late * w1[n] * share[n], (early * w1[n] + late * w2[n]) * share[n]
         cos1, sin1 = rotation(first, k)
         cos2, sin2 = rotation(total, k)
-        dx[n] = early * (cos1 * x1[n] - sin1 * y1[n]) + late * (cos2 * x2[n] - sin2 * y2[n])
-        dy[n] = early * (sin1 * x1[n] + cos1 * y1[n]) + late * (sin2 * x2[n] + cos2 * y2[n])
+        dx[n] = (early * (cos1 * x1[n] - sin1 * y1[n]) + late * (cos2 * x2[n] - sin2 * y2[n])) * share[n]
+        dy[n] = (early * (sin1 * x1[n] + cos1 * y1[n]) + late * (sin2 * x2[n] + cos2 * y2[n])) * share[n]
         turn[n], most[n] = total, max(abs(first), abs(total))
     for n in range(WIDTH):
         if most[n] > angle:
-            first, total = late * w1[n], turn[n]
+            first, total = late * w1[n] * share[n], turn[n]
             cos1, sin1, cos2, sin2 = math.cos(first), math.sin(first), math.cos(total), math.sin(total)
-            dx[n] = early * (cos1 * x1[n] - sin1 * y1[n]) + late * (cos2 * x2[n] - sin2 * y2[n])
-            dy[n] = early * (sin1 * x1[n] + cos1 * y1[n]) + late * (sin2 * x2[n] + cos2 * y2[n])
+            dx[n] = (early * (cos1 * x1[n] - sin1 * y1[n]) + late * (cos2 * x2[n] - sin2 * y2[n])) * share[n]
+            dy[n] = (early * (sin1 * x1[n] + cos1 * y1[n]) + late * (sin2 * x2[n] + cos2 * y2[n])) * share[n]
     move_on(work, k)
     for n in range(WIDTH):
         if most[n] > angle:
@@ -214,7 +236,7 @@ def _advance_pose(work, k):
 
 
 @inlined
-def _put_push(work, wheels, volts, shared):
+def put_push(work, wheels, volts, shared):
     """Fill the drive rows [N, N, N m] from volts (wheels, 1) that all robots share, or (wheels, WIDTH)."""
     for axis in range(3):
         row = work[DRIVE + axis]
@@ -228,29 +250,43 @@ def _put_push(work, wheels, volts, shared):
                     row[n] = u[n] * push[n] if wheel == 0 else row[n] + u[n] * push[n]
 
 
+@inlined
+def step_all(work, box, travels, k, zero):
+    """A step of all, the drive being there."""
+    for n in range(WIDTH):
+        work[NODE, n], work[NODE + 1, n], work[NODE + 2, n] = zero, zero, zero
+    put_stage(work, NODE, zero, box, k, zero)
+    put_stage(work, END, k[BACKWARD], box, k, zero)
+    if travels:
+        advance_pose(work, k)
+    else:
+        for axis in range(3):
+            for n in range(WIDTH):
+                work[SPEED + axis, n] = work[END + axis, n]
+
+
 @kernel
 def march_implicit(first, last, laws, rows, record, rule):
     """Move blocks first..last through all rows of volts; with poses where the states have them."""
-    volts, states, fails = rows
-    _, steps, wheels, width = volts.shape
-    zero, k, after, count = laws.dtype.type(0), rule.numbers, LAW + laws.shape[1], min(states.shape[1], 6)
-    work, sums = np.zeros((after, WIDTH), laws.dtype), np.zeros((TOTALS * 6, WIDTH), laws.dtype)
+    volts, states, fails, fresh = rows
+    pieces, kept, wheels, width = len(states), states.shape[2], volts.shape[2], volts.shape[3]
+    zero, k, after, count = laws.dtype.type(0), rule.numbers, SHARE + laws.shape[2], min(kept, 6)
+    tables, sums = np.zeros((pieces, after, WIDTH), laws.dtype), np.zeros((TOTALS * 6, WIDTH), laws.dtype)
+    steps = volts.shape[1] - pieces + 1
     for b in range(first, last):
-        load(work, LAW, laws[b], states[b])
+        load_all(tables, SHARE, laws, states, fresh, b)
         failure = first_failure(fails[b])
         for step in range(steps):
-            _put_push(work, wheels, volts[b - first, step] if width > 1 else volts[0, step], width == 1)
-            for n in range(WIDTH):
-                work[NODE, n], work[NODE + 1, n], work[NODE + 2, n] = zero, zero, zero
-            put_stage(work, NODE, zero, rule.box, k, zero)
-            put_stage(work, END, k[BACKWARD], rule.box, k, zero)
-            if count > 3:
-                _advance_pose(work, k)
-            else:
-                for axis in range(3):
-                    for n in range(WIDTH):
-                        work[SPEED + axis, n] = work[END + axis, n]
-            if step >= failure:
-                spoil(work, count, fails[b], step)
-            keep(work, step, steps, b, record, sums, count)
-        store(states[b], work)
+            for piece in range(pieces if shows(record, step, steps) else 1):
+                if piece > 0:
+                    hand_over(tables, kept)
+                work, at = tables[piece], step + piece
+                put_push(work, wheels, volts[b - first, at] if width > 1 else volts[0, at], width == 1)
+                step_all(work, rule.box, count > 3, k, zero)
+                if step >= failure:
+                    spoil(work, count, fails[b], step)
+            if step == 0 and pieces > 1:
+                whole_steps(tables, SHARE, laws, fresh, b)
+            keep(tables[pieces - 1], step, steps, b, record, sums, count)
+        for piece in range(pieces):
+            store(states[piece, b], tables[piece])

@@ -1,7 +1,11 @@
 """Kernels that move blocks of robots through rows of held volts: twist alone, with a fast pose, with an exact one.
 
-A block is copied to one table of local rows, `work`, in which no row can be another one: loops along rows become
-vector instructions. No sum crosses robots, so that each has the same bits in any batch and on any number of threads.
+A block is copied to a table of local rows, `work`, in which no row can be another one: loops along rows become vector
+instructions. No sum crosses robots, so that each has the same bits in any batch and on any number of threads.
+
+Where commands act late, robots go from the moment a command begins to act to that of the next, still in one step, and
+their samples lie in between: a second table takes the rest of a row from there, only where a sample is kept. So a
+latency costs as many steps as there are rows, and no result depends on which samples are kept.
 """
 
 from __future__ import annotations
@@ -46,11 +50,18 @@ class Record(NamedTuple):
 
 class Rows(NamedTuple):
     """What moves. volts: (1, steps, wheels, 1) that all robots share, or (those blocks, steps, wheels, WIDTH); states
-    (blocks, 3 or 9, WIDTH): twist and pose; fails (blocks, WIDTH): the step from which on a robot is lost."""
+    (1, blocks, 3 or 9, WIDTH): twist and pose; fails (blocks, WIDTH): the step from which on a robot is lost.
+
+    Where commands act late: volts begin with what acts as the first row begins, one row more; states (2, ..): where the
+    last command began to act, and now; fresh (blocks, WIDTH): robots for which both are one. Laws are then three: of a
+    whole step, of the rest of a row from where its command begins to act, and of what comes before that, (3, blocks,
+    ..); else one.
+    """
 
     volts: NDArray[Any]
     states: NDArray[Any]
     fails: IntArray
+    fresh: NDArray[np.uint8]
 
 
 @inlined
@@ -73,6 +84,45 @@ def store(state, work):
         source, to = work[i if i < 3 else POSE + i - 3], state[i]
         for n in range(WIDTH):
             to[n] = source[n]
+
+
+@inlined
+def load_all(tables, first, laws, states, fresh, b):
+    """`load` of block b into the tables of a march; the first step of what is fresh ends where a command may act."""
+    for piece in range(len(tables)):
+        load(tables[piece], first, laws[piece, b], states[piece, b])
+    if len(tables) > 1:
+        for i in range(laws.shape[2]):
+            to, before = tables[0, first + i], laws[2, b, i]
+            for n in range(WIDTH):
+                to[n] = before[n] if fresh[b, n] else to[n]
+
+
+@inlined
+def whole_steps(tables, first, laws, fresh, b):
+    """After the first row: whole steps for all."""
+    for i in range(laws.shape[2]):
+        to, law = tables[0, first + i], laws[0, b, i]
+        for n in range(WIDTH):
+            to[n] = law[n]
+    for n in range(WIDTH):
+        fresh[b, n] = 0
+
+
+@inlined
+def hand_over(tables, rows):
+    """Copy a state from the first table into the second."""
+    for i in range(rows):
+        row = i if i < 3 else POSE + i - 3
+        to, source = tables[1, row], tables[0, row]
+        for n in range(WIDTH):
+            to[n] = source[n]
+
+
+@inlined
+def shows(record, k, steps):
+    """Whether the end of row k of so many is kept."""
+    return (k + 1 == steps) | (len(record.totals) > 0) | (record.every > 0 and (k + 1) % record.every == 0)
 
 
 @inlined
@@ -151,29 +201,43 @@ def advance_three(speed, law, u0, u1, u2, zero):
             v[n] = exact_step(v[n], u0 * g0[n] + u1 * g1[n] + u2 * g2[n], c[n], s[n], a[n], phi[n], zero)
 
 
+@inlined
+def _slide(work, after, volts, block, k, zero):
+    """A step of all under the volts of row k."""
+    _, _, wheels, width = volts.shape
+    speed, drive, law = work[SPEED:DRIVE], work[DRIVE:POSE], work[LAW:after]
+    if width > 1:
+        put_drive(drive, law, volts[block, k])
+        advance(speed, drive, law, zero)
+    elif wheels == 3:
+        advance_three(speed, law, volts[0, k, 0, 0], volts[0, k, 1, 0], volts[0, k, 2, 0], zero)
+    else:
+        put_shared_drive(drive, law, volts[0, k, :, 0])
+        advance(speed, drive, law, zero)
+
+
 @kernel
 def march_twist(first, last, laws, rows, record):
     """Move blocks first..last through all rows of volts, twist alone."""
-    volts, states, fails = rows
-    _, steps, wheels, width = volts.shape
-    kind = laws.dtype.type
-    zero, after = kind(0), LAW + laws.shape[1]
-    work = np.zeros((after, WIDTH), laws.dtype)
+    volts, states, fails, fresh = rows
+    pieces, width = len(states), volts.shape[3]
+    kind, steps = laws.dtype.type, volts.shape[1] - pieces + 1
+    zero, after = kind(0), LAW + laws.shape[2]
+    tables = np.zeros((pieces, after, WIDTH), laws.dtype)
     sums = np.zeros((TOTALS * 3, WIDTH), laws.dtype)
-    speed, drive, law = work[SPEED:DRIVE], work[DRIVE:POSE], work[LAW:after]
+    work, later = tables[0], tables[pieces - 1]
     for b in range(first, last):
-        load(work, LAW, laws[b], states[b])
+        load_all(tables, LAW, laws, states, fresh, b)
         failure = first_failure(fails[b])
         for k in range(steps):
-            if width > 1:
-                put_drive(drive, law, volts[b - first, k])
-                advance(speed, drive, law, zero)
-            elif wheels == 3:
-                advance_three(speed, law, volts[0, k, 0, 0], volts[0, k, 1, 0], volts[0, k, 2, 0], zero)
-            else:
-                put_shared_drive(drive, law, volts[0, k, :, 0])
-                advance(speed, drive, law, zero)
+            _slide(work, after, volts, 0 if width == 1 else b - first, k, zero)
             if k >= failure:
                 spoil(work, 3, fails[b], k)
-            keep(work, k, steps, b, record, sums, 3)
-        store(states[b], work)
+            if pieces > 1 and k == 0:
+                whole_steps(tables, LAW, laws, fresh, b)
+            if pieces > 1 and shows(record, k, steps):
+                hand_over(tables, 3)
+                _slide(later, after, volts, 0 if width == 1 else b - first, k + 1, zero)
+            keep(later, k, steps, b, record, sums, 3)
+        for piece in range(pieces):
+            store(states[piece, b], tables[piece])

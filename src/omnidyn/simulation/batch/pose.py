@@ -15,39 +15,55 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.compiled.kernel import inlined, kernel, part
-from omnidyn.simulation.batch.exact import BREAKAWAY, COULOMB, PHI, RATE, put_drive, put_shared_drive
-from omnidyn.simulation.batch.march import DRIVE, POSE, SPEED, TOTALS, first_failure, keep, load, spoil, store
-from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters, in_blocks
+from omnidyn.simulation.batch.exact import BREAKAWAY, COULOMB, PHI, RATE, exact_law, put_drive, put_shared_drive
+from omnidyn.simulation.batch.march import (
+    DRIVE,
+    POSE,
+    SPEED,
+    TOTALS,
+    first_failure,
+    hand_over,
+    keep,
+    load_all,
+    shows,
+    spoil,
+    store,
+    whole_steps,
+)
+from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters
 from omnidyn.simulation.exact.march import MAX_TURN_PER_STEP, NODES, PIECE, WEIGHTS, travel, turning
 from omnidyn.simulation.exact.step import course, exact_step, pieces, turned_within
 
-# Rows of `work`: speeds at a node and at the end of a step, displacement and turn, f of yaw, how fast the step goes.
-NODE, END, DX, DY, TURN, FORCE, ALONE, NODE_PHI, LAW = 12, 15, 18, 19, 20, 21, 22, 23, 35
+# Rows of `work`: speeds at a node and at the end of a step, displacement and turn, f of yaw, how fast the step goes;
+# from SHARE on what a step of its length takes.
+NODE, END, DX, DY, TURN, FORCE, ALONE, SHARE, NODE_PHI, LAW = 12, 15, 18, 19, 20, 21, 22, 23, 24, 36
 # sin x = x (1 - x^2/6 (1 - x^2/20 (1 - ..))), cos x = 1 - x^2/2 (1 - x^2/12 (1 - ..)): to the last bit up to PIECE
 SERIES = [1.0 / (k * (k + 1)) for k in (2, 4, 6, 8, 10, 12, 1, 3, 5, 7, 9, 11)]
 ONE, HALF, MORE, DT, FAST = range(12, 17)  # places in `numbers`
 
 
 class GaussFour(NamedTuple):
-    """The rule of an exact pose. phi (blocks, 12, WIDTH) [s]: of the time of each node, 3 axes each.
-
-    times, weights (4,) [s]; numbers: SERIES, then 1, 1/2, 3/2, h [s], and PIECE/h [1/s], from which on a step is a fast
+    """The rule of an exact pose. times, weights (4,) [s]; numbers: SERIES, then 1, 1/2, 3/2, h [s], and PIECE/h [1/s], from which on a step is a fast
     one; all in the type of the batch. gauss: nodes and weights of the scalar engine.
     """
 
-    phi: NDArray[Any]
     times: NDArray[Any]
     weights: NDArray[Any]
     numbers: NDArray[Any]
     gauss: Any
 
 
-def gauss_four(parameters: BatchParameters, dt: float, dtype: Any) -> GaussFour:
+def gauss_four(dt: float, dtype: Any) -> GaussFour:
     """The rule of steps of dt [s]."""
-    times, rate = dt * NODES, parameters.damping / parameters.mass
-    phi = in_blocks(np.concatenate([-np.expm1(-rate * time) / rate for time in times]), dtype)
     numbers = np.array([*SERIES, 1.0, 0.5, 1.5, dt, PIECE / dt], dtype)
-    return GaussFour(phi, times.astype(dtype), (dt * WEIGHTS).astype(dtype), numbers, (NODES, WEIGHTS))
+    return GaussFour((dt * NODES).astype(dtype), (dt * WEIGHTS).astype(dtype), numbers, (NODES, WEIGHTS))
+
+
+def pose_law(parameters: BatchParameters, length: FloatArray, dt: float) -> FloatArray:
+    """The laws of robots under steps of `length` [s], (n,): that as a share of dt, phi of the nodes, `exact_law`."""
+    rate = parameters.damping / parameters.mass
+    phi = [-np.expm1(-rate * (length * node)) / rate for node in NODES]
+    return np.concatenate([length[None] / dt, *phi, exact_law(parameters, length)])
 
 
 @inlined
@@ -72,9 +88,10 @@ def _speeds(work, to, first_phi, zero):
 
 @inlined
 def _see_events(work, k, zero):
-    """Fill FORCE and TURN, and ALONE: how fast a step goes [1/s], beyond all bounds where something stops in it."""
+    """Fill FORCE and TURN, and ALONE: how fast a step goes [1/s], times its share, beyond all bounds where something
+    stops in it."""
     alone, force, turn, w, last = work[ALONE], work[FORCE], work[TURN], work[SPEED + 2], work[END + 2]
-    dt, event, a = k[DT], k[FAST] + k[FAST], work[LAW + RATE + 2]
+    dt, event, a, share = k[DT], k[FAST] + k[FAST], work[LAW + RATE + 2], work[SHARE]
     for n in range(WIDTH):
         alone[n] = zero
     for axis in range(3):
@@ -84,11 +101,12 @@ def _see_events(work, k, zero):
             mirrored, _, q, _, rests, crosses, _ = course(v[n], g[n], c[n], s[n], rate[n], phi[n], zero)
             before = c[n] - q if mirrored else q - c[n]
             force[n] = zero if rests else before  # that of yaw, the last axis, stays
-            fastest = rate[n] if rate[n] > alone[n] else alone[n]
+            speed = rate[n] * share[n]
+            fastest = speed if speed > alone[n] else alone[n]
             alone[n] = event if crosses & (not rests) else fastest
     for n in range(WIDTH):
-        turn[n] = (w[n] - last[n] + force[n] * dt) / a[n]
-        alone[n] += turning(w[n], last[n], force[n], zero, a[n])
+        turn[n] = (w[n] - last[n] + force[n] * (dt * share[n])) / a[n]
+        alone[n] += turning(w[n], last[n], force[n], zero, a[n]) * share[n]
 
 
 @inlined
@@ -102,10 +120,11 @@ def _add_node(work, time, weight, k, fresh):
         work[FORCE],
         work[LAW + RATE + 2],
     )
-    dx, dy = work[DX], work[DY]
+    dx, dy, share = work[DX], work[DY], work[SHARE]
     for n in range(WIDTH):
-        cos, sin = rotation((w[n] - wq[n] + force[n] * time) / a[n], k)
-        ahead, aside = weight * (cos * x[n] - sin * y[n]), weight * (sin * x[n] + cos * y[n])
+        cos, sin = rotation((w[n] - wq[n] + force[n] * (time * share[n])) / a[n], k)
+        long = weight * share[n]
+        ahead, aside = long * (cos * x[n] - sin * y[n]), long * (sin * x[n] + cos * y[n])
         dx[n] = ahead if fresh else dx[n] + ahead
         dy[n] = aside if fresh else dy[n] + aside
 
@@ -169,7 +188,7 @@ def _step(work, times, weights, gauss, room, k, zero):
         _add_node(work, times[node], weights[node], k, node == 0)
     spun, dt = -1, float(k[DT])
     for n in range(WIDTH):
-        if not work[ALONE, n] <= k[FAST] and _go_alone(work, n, dt, gauss, room):
+        if not work[ALONE, n] <= k[FAST] and _go_alone(work, n, dt * work[SHARE, n], gauss, room):
             spun = n
     move_on(work, k)
     for n in range(WIDTH):
@@ -181,27 +200,32 @@ def _step(work, times, weights, gauss, room, k, zero):
 @kernel
 def march_pose(first, last, laws, rows, record, rule):
     """Move blocks first..last through all rows of volts, with exact poses."""
-    volts, states, fails = rows
-    _, steps, _, width = volts.shape
-    zero, after = laws.dtype.type(0), LAW + laws.shape[1]
-    work, sums = np.zeros((after, WIDTH), laws.dtype), np.zeros((TOTALS * 6, WIDTH), laws.dtype)
-    drive, law, room = work[DRIVE:POSE], work[LAW:after], np.empty((6, 3))
+    volts, states, fails, fresh = rows
+    pieces, width = len(states), volts.shape[3]
+    steps, zero, after = volts.shape[1] - pieces + 1, laws.dtype.type(0), SHARE + laws.shape[2]
+    tables, sums = np.zeros((pieces, after, WIDTH), laws.dtype), np.zeros((TOTALS * 6, WIDTH), laws.dtype)
+    room = np.empty((6, 3))
     for b in range(first, last):
-        load(work, LAW, laws[b], states[b])
-        for i in range(rule.phi.shape[1]):
-            for n in range(WIDTH):
-                work[NODE_PHI + i, n] = rule.phi[b, i, n]
+        load_all(tables, SHARE, laws, states, fresh, b)
         failure = first_failure(fails[b])
         for k in range(steps):
-            if width > 1:
-                put_drive(drive, law, volts[b - first, k])
-            else:
-                put_shared_drive(drive, law, volts[0, k, :, 0])
-            spun = _step(work, rule.times, rule.weights, rule.gauss, room, rule.numbers, zero)
-            if spun >= 0:
-                fails[b, spun] = min(fails[b, spun], k)
-                failure = min(failure, k)
-            if k >= failure:
-                spoil(work, 6, fails[b], k)
-            keep(work, k, steps, b, record, sums, 6)
-        store(states[b], work)
+            for piece in range(pieces if shows(record, k, steps) else 1):
+                if piece > 0:
+                    hand_over(tables, 9)
+                work, at = tables[piece], k + piece
+                drive, law = work[DRIVE:POSE], work[LAW:after]
+                if width > 1:
+                    put_drive(drive, law, volts[b - first, at])
+                else:
+                    put_shared_drive(drive, law, volts[0, at, :, 0])
+                spun = _step(work, rule.times, rule.weights, rule.gauss, room, rule.numbers, zero)
+                if spun >= 0:
+                    fails[b, spun] = min(fails[b, spun], k)
+                    failure = min(failure, k)
+                if k >= failure:
+                    spoil(work, 6, fails[b], k)
+            if k == 0 and pieces > 1:
+                whole_steps(tables, SHARE, laws, fresh, b)
+            keep(tables[pieces - 1], k, steps, b, record, sums, 6)
+        for piece in range(pieces):
+            store(states[piece, b], tables[piece])

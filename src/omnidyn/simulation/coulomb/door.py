@@ -11,7 +11,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.layout import N_AXES, Plant, many
 from omnidyn.simulation.coulomb.law import couples, drives_of, is_coulomb, kind_of, laws_of, rims_of
-from omnidyn.simulation.coulomb.run import Law, Loop, Rows, Seen, empty_seen, new_work, run_loop, run_rows
+from omnidyn.simulation.coulomb.run import run_loop, run_rows
+from omnidyn.simulation.coulomb.state import Law, Loop, Rows, Seen, empty_seen, new_work
 from omnidyn.simulation.speed_loop import LoopCommands
 from omnidyn.simulation.way import SAME_TIME
 

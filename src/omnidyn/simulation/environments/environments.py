@@ -199,7 +199,11 @@ class Environments:
         substep = np.array(shares) * setting.dt / setting.substeps
         travels = task != VELOCITY or sensors.averaged
         voltage = largest_voltage(robot)
-        lengths, law = 0.5 * substep if travels else substep, law_of(robot) or EXACT_LAW
+        law = law_of(robot) or EXACT_LAW
+        halves = np.full(len(shares), 2 if travels else 1)
+        if len(shares) > 1 and law != EXACT_LAW:
+            halves[np.argmin(shares)] = 1
+        lengths = substep / halves
         turning = [member.body.rotating_frame for member in self.pool.robots] or robot.body.rotating_frame
         rows = rows_of(self.pool.parameters, law, turning, voltage, lengths, kind)
         rule = np.array([stages(law == BOX_LAW, length, kind).numbers for length in lengths])
@@ -212,6 +216,7 @@ class Environments:
             AUTORESET[self.autoreset],
             setting.substeps,
             setting.steps,
+            halves,
             np.array(lags, dtype=np.int64),
             np.array(shares),
             sensors.averaged,

@@ -32,7 +32,7 @@ LATER, PER_INTERVAL, AGAIN = 16, 4, 3  # from LATER on for every interval a push
 class Numbers(NamedTuple):
     """What does not change from step to step.
 
-    task, autoreset: as above. substeps: of a piece. limit: steps of an episode. lags, shares: a row per piece of a
+    task, autoreset: as above. substeps: of a piece; halves: 2 of each with poses, or 1, a number per piece. limit: steps of an episode. lags, shares: a row per piece of a
     step, the steps by which the voltage that acts in it is late, and its length as a share. averaged: whether measured
     speeds are means over the step, kept: share of the last one that a low pass keeps. travels: whether means and poses
     are needed; pushed: whether there are pushes.
@@ -47,6 +47,7 @@ class Numbers(NamedTuple):
     autoreset: int
     substeps: int
     limit: int
+    halves: Any
     lags: Any
     shares: Any
     averaged: bool

@@ -1,5 +1,8 @@
 """A block of robots over one step: twist by `exact_step` or implicit steps, mean twist and pose by Simpson's rule.
 
+Where commands act late a step has two pieces. The shorter one, of no more than half a step, takes one implicit step
+where the longer one takes two, and mean and pose from its stages: no implicit step is longer than without a latency.
+
     mean = (v(0) + 4 v(h/2) + v(h)) / 6,    x(h) = x(0) + h (R(0) v(0) + 4 R(h/2) v(h/2) + R(h) v(h)) / 6
 
 with the exact speeds at both ends and in the middle of a substep h; the heading in the middle is that of the parabola
@@ -17,9 +20,9 @@ import math
 import numpy as np
 
 from omnidyn.compiled.kernel import inlined, part
-from omnidyn.simulation.batch.implicit import BACKWARD, LAW, TURNING, put_stage
-from omnidyn.simulation.batch.march import DRIVE, SPEED
-from omnidyn.simulation.batch.pose import END, NODE
+from omnidyn.simulation.batch.implicit import ANGLE, BACKWARD, LAW, TURNING, advance_pose, put_stage
+from omnidyn.simulation.batch.march import DRIVE, POSE, SPEED
+from omnidyn.simulation.batch.pose import ALONE, DX, DY, END, NODE, TURN, move_on, rotation
 from omnidyn.simulation.environments.layout import (
     BOX_LAW,
     BREAKAWAY,
@@ -32,6 +35,7 @@ from omnidyn.simulation.environments.layout import (
     W,
 )
 from omnidyn.simulation.exact.step import exact_step
+from omnidyn.simulation.implicit.step import GAMMA
 
 
 @inlined
@@ -127,17 +131,43 @@ def advance(numbers, work, twist, drive, robots, piece):
 
 
 @inlined
-def travel(numbers, work, twist, pose, mean, room, drive, robots, piece):
-    """Go on by the substeps of a piece; with mean and pose, each in halves. room (6, W): twists before and between."""
+def travel(numbers, work, twist, mean, room, drive, robots, piece):
+    """Go on by the substeps of a piece; with mean and pose, each in halves, or from the stages of one step.
+
+    room (6, W): twists before and between. Poses stand in `work`, see `face`.
+    """
     share = numbers.shares[piece] / numbers.substeps
-    halves = 2 if numbers.travels else 1
+    halves = numbers.halves[piece]
     for half in range(halves * numbers.substeps):
-        if numbers.travels:
+        if halves == 2:
             copy_rows(room[3 * (half % 2) : 3 * (half % 2) + 3], twist)
         advance(numbers, work, twist, drive, robots, piece)
-        if numbers.travels and half % 2:
+        if halves == 1 and numbers.travels:
+            add_stages(mean, work, share * (1.0 - numbers.kept))
+            advance_pose(work, numbers.rule[piece])
+        elif halves == 2 and half % 2:
             add_means(mean, room, twist, share * (1.0 - numbers.kept))
-            move_poses(pose, room, twist, share * numbers.dt)
+            move_poses(work, room, twist, share * numbers.dt, numbers.rule[piece])
+
+
+@inlined
+def face(work, pose):
+    """Take over poses (3, W), and where they face."""
+    copy_rows(work[POSE : POSE + 3], pose)
+    heading, cos, sin, carry = work[POSE + 2], work[POSE + 3], work[POSE + 4], work[POSE + 5]
+    for n in range(W):
+        cos[n], sin[n], carry[n] = math.cos(np.float64(heading[n])), math.sin(np.float64(heading[n])), 0
+
+
+@inlined
+def add_stages(mean, work, share):
+    """Add to mean (3, W) what a step counts in it: a share of its own mean, from the speeds of its stages."""
+    kind = mean.dtype.type
+    early, late = kind(share * (1.0 - GAMMA)), kind(share * GAMMA)
+    for j in range(3):
+        total, v1, v2 = mean[j], work[NODE + j], work[END + j]
+        for n in range(W):
+            total[n] += early * v1[n] + late * v2[n]
 
 
 @inlined
@@ -151,27 +181,32 @@ def add_means(mean, room, twist, share):
             total[n] += part_of_mean * (v0[n] + four * v1[n] + v2[n])
 
 
-@part
-def move_poses(pose, room, twist, length):
-    """Move poses (3, W) by a substep of so many seconds."""
-    kind = pose.dtype.type
+@inlined
+def move_poses(work, room, twist, length, k):
+    """Move the poses by a substep of so many seconds; k: of `stages`."""
+    kind = twist.dtype.type
     four, five, eight, sixth, per_24 = kind(4), kind(5), kind(8), kind(length / 6.0), kind(length / 24.0)
-    x, y, heading = pose[0], pose[1], pose[2]
+    x0, y0, w0, x1, y1, w1 = room[0], room[1], room[2], room[3], room[4], room[5]
+    x2, y2, w2, angle = twist[0], twist[1], twist[2], k[ANGLE]
+    dx, dy, turn, most = work[DX], work[DY], work[TURN], work[ALONE]
     for n in range(W):
-        begin, middle, end = room[2, n], room[5, n], twist[2, n]
-        angle = heading[n]
-        halfway = angle + per_24 * (five * begin + eight * middle - end)
-        after = angle + sixth * (begin + four * middle + end)
-        c0, s0 = kind(math.cos(np.float64(angle))), kind(math.sin(np.float64(angle)))
-        c1, s1 = kind(math.cos(np.float64(halfway))), kind(math.sin(np.float64(halfway)))
-        c2, s2 = kind(math.cos(np.float64(after))), kind(math.sin(np.float64(after)))
-        ahead = c0 * room[0, n] + four * (c1 * room[3, n]) + c2 * twist[0, n]
-        sideways = s0 * room[1, n] + four * (s1 * room[4, n]) + s2 * twist[1, n]
-        x[n] += sixth * (ahead - sideways)
-        ahead = s0 * room[0, n] + four * (s1 * room[3, n]) + s2 * twist[0, n]
-        sideways = c0 * room[1, n] + four * (c1 * room[4, n]) + c2 * twist[1, n]
-        y[n] += sixth * (ahead + sideways)
-        heading[n] = after
+        halfway = per_24 * (five * w0[n] + eight * w1[n] - w2[n])
+        total = sixth * (w0[n] + four * w1[n] + w2[n])
+        cos1, sin1 = rotation(halfway, k)
+        cos2, sin2 = rotation(total, k)
+        dx[n] = sixth * (x0[n] + four * (cos1 * x1[n] - sin1 * y1[n]) + (cos2 * x2[n] - sin2 * y2[n]))
+        dy[n] = sixth * (y0[n] + four * (sin1 * x1[n] + cos1 * y1[n]) + (sin2 * x2[n] + cos2 * y2[n]))
+        turn[n], most[n] = total, max(abs(halfway), abs(total))
+    for n in range(W):
+        if most[n] > angle:
+            halfway = per_24 * (five * w0[n] + eight * w1[n] - w2[n])
+            cos1, sin1, cos2, sin2 = math.cos(halfway), math.sin(halfway), math.cos(turn[n]), math.sin(turn[n])
+            dx[n] = sixth * (x0[n] + four * (cos1 * x1[n] - sin1 * y1[n]) + (cos2 * x2[n] - sin2 * y2[n]))
+            dy[n] = sixth * (y0[n] + four * (sin1 * x1[n] + cos1 * y1[n]) + (sin2 * x2[n] + cos2 * y2[n]))
+    move_on(work, k)
+    for n in range(W):
+        if most[n] > angle:
+            work[POSE + 3, n], work[POSE + 4, n] = math.cos(work[POSE + 2, n]), math.sin(work[POSE + 2, n])
 
 
 @part

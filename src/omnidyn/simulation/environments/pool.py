@@ -132,8 +132,7 @@ LAWS = {EXACT: EXACT_LAW, BOX: BOX_LAW, DIRECTION: DIRECTION_LAW}
 
 def law_of(robot: Robot) -> int | None:
     """How a robot is moved in blocks; None where it cannot be."""
-    at_once = robot.model_copy(update={"drive": robot.drive.model_copy(update={"latency": 0.0})})
-    return LAWS.get(engine_kind(at_once, VOLTAGE, None))
+    return LAWS.get(engine_kind(robot, VOLTAGE, None))
 
 
 def why_no_environment(robot: Robot) -> list[str]:

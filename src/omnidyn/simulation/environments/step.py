@@ -6,6 +6,8 @@ import numpy as np
 
 from omnidyn.compiled.kernel import inlined, kernel, part
 from omnidyn.simulation.batch.implicit import LAW, TURNING
+from omnidyn.simulation.batch.march import POSE
+from omnidyn.simulation.batch.pose import SHARE
 from omnidyn.simulation.environments.draws import draw, robot_key, uniform
 from omnidyn.simulation.environments.layout import (
     AGAIN,
@@ -26,6 +28,7 @@ from omnidyn.simulation.environments.motion import (
     add_push,
     copy_row,
     copy_rows,
+    face,
     first_gain,
     phi_of,
     put_drive,
@@ -101,12 +104,12 @@ def take_action(out, action, first):
 @inlined
 def move(numbers, state, b, now, action, rooms):
     """A block over a step: all pieces of it. action, acting: (wheels, W); room (6, W); work; the other rooms (3, W)."""
-    twist, pose, mean, drive, acting, room, work = rooms
+    twist, mean, drive, acting, room, work = rooms
     robots, past = state.robots[b], state.past[b]
     gain, late = first_gain(robots, len(action)), numbers.lags[0] > 0
     copy_rows(twist, state.twist[b])
     if numbers.travels:
-        copy_rows(pose, state.pose[b])
+        face(work, state.pose[b])
         kept = mean.dtype.type(numbers.kept)
         for j in range(3):
             for n in range(W):
@@ -118,14 +121,14 @@ def move(numbers, state, b, now, action, rooms):
         if numbers.pushed:
             add_push(drive, state.push[b], robots)
         if numbers.travels or numbers.law != EXACT_LAW:
-            travel(numbers, work, twist, pose, mean, room, drive, robots, piece)
+            travel(numbers, work, twist, mean, room, drive, robots, piece)
         else:
             slide(twist, drive, robots, phi_of(piece), numbers.substeps)
     if late:
         copy_rows(past[now % len(past)], action)
     copy_rows(state.twist[b], twist)
     if numbers.travels:
-        copy_rows(state.pose[b], pose)
+        copy_rows(state.pose[b], work[POSE : POSE + 3])
         copy_rows(state.mean[b], mean)
 
 
@@ -214,9 +217,11 @@ def step_blocks(first, last, now, numbers, state, action, buffers):
     """
     dtype, shape, over = state.twist.dtype, (3, W), np.uint8(0)
     taken, acting = np.zeros((len(action), W), dtype), np.zeros((len(action), W), dtype)
-    twist, pose = np.zeros(shape, dtype), np.zeros(shape, dtype)
-    mean, drive = np.zeros(shape, dtype), np.zeros(shape, dtype)
-    rooms = (twist, pose, mean, drive, acting, np.zeros((6, W), dtype), np.zeros((LAW + TURNING + 1, W), dtype))
+    twist, mean, drive = np.zeros(shape, dtype), np.zeros(shape, dtype), np.zeros(shape, dtype)
+    work = np.zeros((LAW + TURNING + 1, W), dtype)
+    for n in range(W):
+        work[SHARE, n] = 1
+    rooms = (twist, mean, drive, acting, np.zeros((6, W), dtype), work)
     row, reached = np.zeros(W, dtype), np.zeros(W, np.uint8)
     for b in range(first, last):
         take_action(taken, action, b * W)

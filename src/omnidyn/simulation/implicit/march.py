@@ -335,7 +335,10 @@ def _row(plant, stage, bare, spare, state, dt, tol, step_limit, h, pose, counts)
         cross_band(plant, stage, state)
     counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
     while remaining > 0.0 and counts[1] <= step_limit:
-        length, h = find_step(plant, stage, spare, state, h, remaining, dt, tol, counts)
+        tried = h
+        length, h = find_step(plant, stage, spare, state, tried, remaining, dt, tol, counts)
+        if length == remaining:  # the end of the row may have cut it short, not its error
+            h = max(h, tried)
         advance_pose(pose, state.x, middle.x, two.x, body.length, length, SIMPSON)
         copy_state(state, two)
         stage.task.facing = pose[2]

@@ -12,13 +12,14 @@ from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.friction.kinds import KARNOPP
-from omnidyn.model.keys import CENTRE, ROTOR, WHEEL, Key
+from omnidyn.model.keys import CENTRE, DEAD_BAND, ROTOR, WHEEL, Key
 from omnidyn.model.layout import N_AXES, Plant, PlantState, Stage, many, new_stage, new_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import refuse_slip
 
+RATE = "drive.rate_Hz"
 EPS = 1e-5  # relative change of a parameter: rounding 1e-11, curvature 1e-10; all kinks are on their branch
 
 
@@ -178,3 +179,23 @@ def _moved(robot: Robot, key: str, scale: float, side: float) -> Robot:
     """The robot with one number changed a little; not checked, for it may be at the end of its range."""
     place = Key.parse(key)
     return place.set(robot, place.get(robot) + side * EPS * scale, checked=False)
+
+
+def refuse_rate(keys: Sequence[str]) -> None:
+    """Raises UnsupportedError where the rate of a speed loop, or the dead band behind it, is among the keys."""
+    if DEAD_BAND in keys:
+        raise UnsupportedError(
+            "no derivative by the dead band behind a speed loop",
+            got=DEAD_BAND,
+            expected="other keys",
+            where="keys",
+            remedy="try a few dead bands instead",
+        )
+    if RATE in keys:
+        raise UnsupportedError(
+            "no derivative by the rate of the speed loop",
+            got=RATE,
+            expected="other keys",
+            remedy="its ticks would move; try a few rates instead",
+            where="keys",
+        )

@@ -257,6 +257,44 @@ def march_with_derivatives(room, along, voltage, bound, dt, tol, out, first, ds,
             copy_table(dposes[r + 1], dpose)
 
 
+def run_with_derivatives(
+    numbers: Plant,
+    directions: Directions,
+    held_commands: Commands,
+    bound: FloatArray,
+    start: tuple[FloatArray, FloatArray],
+    first: FloatArray,
+    tol: float,
+    samples: Samples | None = None,
+) -> tuple[Outcome, FloatArray, FloatArray]:
+    """The run of `run_implicit`, with derivatives of state (rows + 1, K, D) and pose (rows + 1, K, 3).
+
+    With `samples`, the run is sampled there instead: the derivatives by row are left out, both arrays are empty.
+    """
+    assert held_commands.voltage is not None
+    state = start_state(numbers, start[0], np.zeros(numbers.wheels))
+    out, row_count = (
+        empty_outcome(len(held_commands.dt), state, start[1]),
+        len(held_commands.dt) + 1 if samples is None else 0,
+    )
+    ds, dposes = np.zeros((row_count, *first.shape)), np.zeros((row_count, len(first), 3))
+    ds[:1] = first
+    march_with_derivatives(
+        march_workspace(numbers),
+        directions,
+        held_commands.voltage,
+        bound,
+        held_commands.dt,
+        tol,
+        out,
+        first,
+        ds,
+        dposes,
+        samples or NO_SAMPLES,
+    )
+    return out, ds, dposes
+
+
 # The march with derivatives through the firmware's speed loop: the loop's memory and its derivatives go along
 #
 # At a tick the voltage answers the state, so that its derivative is that of the loop on the branch that the run took:

@@ -326,7 +326,10 @@ def _march(plant, voltage, bound, dt, loop, tol, step_limit, out, room):
         remaining = dt[k]
         if tol > 0.0:
             while remaining > 0.0:
-                length, h = _find(plant, stage, pose, h, remaining, dt[k], tol, room)
+                tried = h
+                length, h = _find(plant, stage, pose, tried, remaining, dt[k], tol, room)
+                if length == remaining:  # the end of the row may have cut it short, not its error
+                    h = max(h, tried)
                 advance_pose(pose, now.x, room.middle.x, two.x, 1.0, length, SIMPSON)
                 copy_row(now.x, two.x)
                 copy_each(now.each, two.each)

@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 
 import omnidyn
+from omnidyn.studio import calls
 from omnidyn.studio.calls import LogFile
 from omnidyn.studio.parts import COMPARE, COMPARE_START, DRIFT, ROBOT
 from omnidyn.studio.session import Session
@@ -75,15 +76,7 @@ class Comparing:
 
     def calls(self) -> tuple[str, str]:
         """The command line and the Python call that compare robots with logs."""
-        robots = [Path(self.session.robots[name]).name for name in self.robots if name]
-        words = ["omnidyn", "compare", *(log.name for log in self.logs)]
-        words += [word for name in robots for word in ("--robot", name)]
-        words += max((log.flags for log in self.logs), key=len)
-        logs = ", ".join(log.run_python.replace(", current_unsigned=True", "") for log in self.logs)
-        first, *others = (f"omnidyn.load_robot({name!r})" for name in robots)
-        more = "".join(f", {other}" for other in others)
-        more += ", current_unsigned=True" * any(log.unsigned for log in self.logs)
-        return shlex.join(words), f"omnidyn.compare({first}, [{logs}]{more})"
+        return calls.compare(self.logs, [self.session.robots[name] for name in self.robots if name])
 
     async def run(self) -> None:
         """Compare the robots with the logs."""

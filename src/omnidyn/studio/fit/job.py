@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -58,7 +59,7 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
         [log.to_run() for log in logs],
         robot,
         OutputError(free=free) if free else None,
-        hold_out=[_literal(path) for path in request["hold_out"]],
+        hold_out=[glob.escape(path) for path in request["hold_out"]],
         progress=listen,
         check=logs,
         keep_best=True,
@@ -86,11 +87,6 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     }
     shown["report"] = _write_report(result, request, folder / "report.html")
     return shown
-
-
-def _literal(path: str) -> str:
-    """A glob that only this path fits."""
-    return "".join(f"[{c}]" if c in "*?[" else c for c in path)
 
 
 def _numbers(estimate: Estimate) -> Table:

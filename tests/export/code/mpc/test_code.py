@@ -30,6 +30,7 @@ ELLIPSE = Friction(direction=DirectionFriction(coulomb=(2.6, 1.9), viscous=0.9, 
 FOUR = ROBOT.wheels.replace(azimuth_deg=(45.0, 135.0, 225.0, 315.0))
 DUTY = Drive.model_validate({"kind": "duty", "supply_V": 7.0, "latency_s": 0.04})
 LOOP = Drive.model_validate({"kind": "speed", "rate_Hz": 200.0, "kp_V_s_rad": 0.1})
+SUMMED = LOOP.replace(kp=0.2, ki=2.0, latency=0.04)
 MEAN = Sensors(twist="mean")
 VARIANTS = {
     "duty, two steps late": (ROBOT.replace(drive=DUTY), {}),
@@ -47,6 +48,9 @@ VARIANTS = {
     "speeds that are means": (ROBOT.replace(sensors=MEAN), {}),
     "speeds that are means, no observer": (ROBOT.replace(sensors=MEAN), {"observer": False}),
     "no friction, a loop in the firmware": (ROBOT.replace(drive=LOOP), {"friction": False}),
+    "a loop with a sum, two steps late": (ROBOT.replace(drive=SUMMED), {}),
+    "a loop with a sum, no observer": (ROBOT.replace(drive=SUMMED.replace(latency=0.0)), {"observer": False}),
+    "a loop with a sum, speeds that are means": (ROBOT.replace(drive=SUMMED, sensors=MEAN), {}),
 }
 OK, LIMITED, STILL, BACKWARDS, BAD_TIME, BAD_POSE, BAD_TWIST, BAD_PATH = range(8)
 
@@ -82,9 +86,12 @@ def in_double(text):
 
 
 @pytest.mark.parametrize("sensors", [None, MEAN])
-def test_in_double_precision_its_formulas_are_those_of_python(sensors, tmp_path):
+@pytest.mark.parametrize(
+    "drive", [ROBOT.drive, SUMMED.replace(latency=0.0), SUMMED], ids=["volts", "loop", "late loop"]
+)
+def test_in_double_precision_its_formulas_are_those_of_python(sensors, drive, tmp_path):
     """What float32 hides: every number of the observer, the model and the program."""
-    robot = ROBOT.replace(sensors=sensors)
+    robot = ROBOT.replace(sensors=sensors, drive=drive)
     for name, text in c_controller(robot, controller="mpc").files.items():
         (tmp_path / name).write_text(in_double(text))
     (tmp_path / "one.c").write_text('#include "omnidyn_control.c"\nomnidyn_control one;\n')
@@ -103,12 +110,12 @@ def test_in_double_precision_its_formulas_are_those_of_python(sensors, tmp_path)
         seen = np.concatenate([live.pose, twist]) + rng.standard_normal(6) * [2e-4, 2e-4, 4e-4, 1e-3, 1e-3, 4e-3]
         seen[3:] += [0.06, 0.0, -0.3] if k == 40 else [0.0, 0.0, 0.0]  # a knock
         seen[:3] += np.nan if k in (50, 51) else 0.0
-        motion, found = follow.at(t + 0.02 * np.arange(21)), np.zeros(3)
+        motion, found = follow.at(t + drive.latency + 0.02 * np.arange(21)), np.zeros(3)
         rows = np.ascontiguousarray(np.concatenate([motion.pose, motion.velocity], axis=1))
         given = [each.ctypes.data_as(ctypes.c_void_p) for each in (seen[:3].copy(), seen[3:].copy(), rows, found)]
         library.omnidyn_control_step(ctypes.c_void_p(one), ctypes.c_double(t - times[k - 1] if k else 0.0), *given)
         sent = own.step(t, seen[:3], seen[3:], follow)
-        apart.append(np.abs(found - sent).max())
+        apart.append(np.abs(found - sent).max() * 6.0 / own.limit.max())
         for _ in range(1 + (k == 59)):
             live.step(sent)
     assert np.median(apart) < 1e-5  # [V]; its numbers have nine digits

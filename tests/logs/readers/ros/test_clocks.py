@@ -2,8 +2,12 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+import omnidyn
 from omnidyn.logs.readers.ros.clocks import Clocked, trusted
+from tests.support.bags import BagMaker, write_mcap
 
 S = 10**9
 START = 1_700_000_000 * S
@@ -160,3 +164,106 @@ def test_a_slow_recording_whose_clock_is_set_back_is_still_told():
     late = np.where(each.receive > START + 5 * S, 3 * S, 0)
     _, notes = trusted([changed(each, each.receive - late, np.zeros_like(each.header))])
     assert any("the clock of the recorder was set back by 2.9" in note for note in notes)
+
+
+# ---- received at any pace, with pauses ---------------------------------------------------------------------
+
+STEP = 34_000_000  # [ns] between stamps, of simulated time
+PACES = st.floats(-1.0, 1.0).map(lambda power: 10.0**power)  # simulated seconds in a second of the recorder
+BREAKS = st.lists(st.tuples(st.floats(0.05, 0.95), st.floats(0.1, 30.0)), max_size=4)  # (where, how long [s])
+
+
+def received(true, pace, pauses, stalls, rng):
+    """When messages of simulated times are received [ns], in their order.
+
+    A pause stops all. A stall only holds messages back: they come at its end, at once.
+    """
+    wall, span = (true - true[0]) / pace, (true[-1] - true[0]) / pace
+    late = wall + rng.uniform(0.0, 2e6, len(wall))
+    for where, length in pauses:
+        late += np.where(wall > where * span, length * S, 0.0)
+    for where, length in stalls:
+        begin = late[int(where * len(late))]
+        late = np.where((late >= begin) & (late < begin + length * S), begin + length * S, late)
+    return START + np.rint(np.maximum.accumulate(late)).astype(np.int64)
+
+
+def simulated(pace, pauses=(), stalls=(), seed=0, count=400):
+    """(stamped topic, bare topic, the true times of that): every fifth message of both is of the bare one."""
+    rng = np.random.default_rng(seed)
+    true = 5 * S + np.cumsum(np.rint(STEP * rng.uniform(0.8, 1.2, count))).astype(np.int64)
+    receive, order, bare = received(true, pace, pauses, stalls, rng), np.arange(count), np.arange(count) % 5 == 4
+    stamped = Clocked("/odom", receive[~bare], order[~bare], true[~bare])
+    return stamped, Clocked("/cmd_vel", receive[bare], order[bare], np.zeros(bare.sum(), np.int64)), true[bare]
+
+
+@given(PACES, BREAKS, BREAKS, st.integers(0, 99))
+def test_regular_stamps_are_believed_whenever_they_were_received(pace, pauses, stalls, seed):
+    """No row is moved, none comes before one that it followed; what has no stamp lies between its neighbours."""
+    stamped, bare, true = simulated(pace, pauses, stalls, seed)
+    found, notes = trusted([stamped, bare])
+    np.testing.assert_array_equal(found["/odom"], stamped.header)
+    assert not any("was set" in note or "go back" in note for note in notes)
+    assert (np.diff(found["/cmd_vel"]) >= 0).all()
+    if not stalls:
+        assert np.abs(found["/cmd_vel"] - true)[1:-1].max() < 2.5 * STEP + 2e6 * pace
+
+
+@given(PACES, BREAKS, BREAKS, st.floats(0.1, 0.9), st.floats(1.0, 1e6), st.booleans(), st.integers(0, 99))
+def test_where_a_clock_was_set_rows_keep_their_order_and_steps(pace, pauses, stalls, where, jump, back, seed):
+    stamped, bare, _ = simulated(pace, pauses, stalls, seed)
+    k = int(where * len(stamped.header))
+    if not back:
+        jump += 300.0 if pauses or stalls else 0.0  # beyond what a pause of 30 s at ten times real time hides
+    header = (
+        stamped.header
+        + 10**7 * S
+        + np.where(np.arange(len(stamped.header)) >= k, round((-jump if back else jump) * S), 0)
+    )
+    found, notes = trusted([changed(stamped, header=header), bare])
+    steps, own = np.diff(found["/odom"]), np.diff(stamped.header)
+    assert (steps > 0).all()
+    assert sum("its clock was set 1 time" in note for note in notes) == 1
+    np.testing.assert_array_equal(np.delete(steps, k - 1), np.delete(own, k - 1))
+    assert steps[k - 1] < S
+    assert (np.diff(found["/cmd_vel"]) >= 0).all()
+
+
+@given(PACES, BREAKS, st.integers(0, 99))
+def test_messages_without_a_stamp_stay_between_those_that_have_one(pace, pauses, seed):
+    stamped, _, _ = simulated(pace, pauses, seed=seed)
+    blank = np.random.default_rng(seed).random(len(stamped.header)) < 0.3
+    found, _ = trusted([changed(stamped, header=np.where(blank, 0, stamped.header))])
+    assert (np.diff(found["/odom"]) >= 0).all()
+    np.testing.assert_array_equal(found["/odom"][~blank], stamped.header[~blank])
+
+
+@pytest.mark.parametrize("pace", [0.22, 1.0, 3.0])
+def test_topics_of_one_simulated_clock_are_of_one_clock_however_late_one_begins(pace):
+    first, _, _ = simulated(pace)
+    second = Clocked("/joints", first.receive[250:], first.order[250:] + 1000, first.header[250:])
+    found, notes = trusted([first, second])
+    np.testing.assert_array_equal(found["/joints"], second.header)
+    assert not any("stamped by another clock" in note for note in notes)
+
+
+@pytest.mark.parametrize("pace, pause", [(1.0, 0.0), (0.22, 0.0), (1.0, 20.0), (0.22, 0.8), (1.0, 0.6), (3.0, 0.8)])
+def test_a_bag_of_a_simulation_lasts_as_long_as_its_stamps_say(tmp_path, pace, pause):
+    """39.95 s at 34 ms; a pause was a gap of 20 s, a stall 111.6 s, and at three times real time parts overlapped."""
+    pytest.importorskip("mcap")
+    pytest.importorskip("rosbags")
+    maker = BagMaker(start=0)
+    for k in range(1176):
+        t, wall = 5.0 + 0.034 * k, 1.76e9 + 0.034 * k / pace + pause * (k > 600)
+        maker.odometry(t, (0.01 * k, 0.0, 0.0), (0.3, 0.0, 0.0), late=wall - t)
+    run = omnidyn.read_log(write_mcap(maker, tmp_path / "log.mcap"))
+    np.testing.assert_allclose(run.t - run.t[0], 0.034 * np.arange(1176), atol=1e-6)
+    np.testing.assert_allclose(run.pose[:, 0], 0.01 * np.arange(1176))
+
+
+def test_stamps_that_go_back_again_and_again_are_no_time():
+    given = topics(seconds=60.0, a=100.0)["a"]
+    looped = START + (given.header - START) % (2 * S)  # a recording of two seconds, played in a loop
+    found, notes = trusted([changed(given, header=looped)])
+    assert np.array_equal(found["/a"], given.receive)
+    assert any("/a: its stamps go back too often to be a time" in note for note in notes)

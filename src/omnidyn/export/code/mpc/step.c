@@ -3,29 +3,45 @@
 
 /* What a measured state (pose, twist) says of the state, the push on each axis, and the share of its friction: a Kalman
    filter with three states for each axis, and one for each entry of the pose. */
-#if AVERAGED
+#if AVERAGED || SUM
 /* The mean of the twist over a step from `before`, as encoders count it. */
-static void mean_twist(const omnidyn_control *c, const float before[6], float mean[3])
+static void mean_twist(const omnidyn_control *c, const float before[6], const float *pose, float mean[3])
 {
-    const float *pose = c->believed[0], turn = 0.25f * (before[5] + c->believed[1][2]) * STEP;
+    const float turn = 0.25f * (before[5] + pose[5]) * STEP;
     const float per = 1.0f / ((1.0f - turn * turn / 6.0f) * STEP);
     seen(c->base[2] + before[2] + turn, per * (pose[0] - before[0]), per * (pose[1] - before[1]), mean);
     mean[2] = (pose[2] - before[2]) / STEP;
 }
 #endif
 
-#if AVERAGED && !LEARN
-/* Without an observer: the pose measured, and the twist at which a step ends whose mean was measured. */
+#if SUM
+/* Add to the push what the sum of the speed loop gains in a step under a drive, with this mean of the twist. */
+static void sum_up(omnidyn_control *c, const float *drive, const float *mean)
+{
+    int i;
+    ROLLED for (i = 0; i < 3; i++) {
+        c->believed[2][i] += STEP * (dot3(SUM_DRIVE[i], drive) - dot3(SUM_TWIST[i], mean));
+    }
+}
+#endif
+
+#if (AVERAGED || SUM) && !LEARN
+/* Without an observer: what is measured, but the twist at which a step ends where its mean was measured. */
 static void follow(omnidyn_control *c, const float *measured, int known)
 {
     float before[6], mean[3];
     int i;
     memcpy(before, c->believed, sizeof(before));
     run_on(c, c->believed[0], c->sent[0]);
-    mean_twist(c, before, mean);
+    mean_twist(c, before, c->believed[0], mean);
+#if SUM
+    if (known) {
+        sum_up(c, c->sent[0], mean);
+    }
+#endif
     ROLLED for (i = 0; i < 3; i++) {
         c->believed[0][i] = measured[i];
-        c->believed[1][i] = measured[3 + i] + (known ? c->believed[1][i] - mean[i] : 0.0f);
+        c->believed[1][i] = measured[3 + i] + (known && AVERAGED ? c->believed[1][i] - mean[i] : 0.0f);
     }
 }
 #endif
@@ -36,12 +52,22 @@ static void observe(omnidyn_control *c, const float *measured, int known)
     float force[4][3];
     int i, j, q;
 #if AVERAGED
-    float before[6], mean[3], moved[3], middle;
+    float moved[3], middle;
+#endif
+#if AVERAGED || SUM
+    float before[6], mean[3];
     memcpy(before, c->believed, sizeof(before));
 #endif
     run_on(c, c->believed[0], c->sent[0]);
+#if AVERAGED || SUM
+    mean_twist(c, before, c->believed[0], mean);
+#endif
+#if SUM
+    if (known) {
+        sum_up(c, c->sent[0], mean);
+    }
+#endif
 #if AVERAGED
-    mean_twist(c, before, mean);
     middle = c->base[2] + 0.5f * (before[2] + c->believed[0][2]);
 #endif
     friction_at(c->believed[1], PLAIN, force);
@@ -324,7 +350,7 @@ static void expect(omnidyn_control *c, float measured[6])
     run_on(c, c->believed[0], c->sent[0]);
     memcpy(after, c->believed, sizeof(after));
 #if AVERAGED
-    mean_twist(c, before, after + 3);
+    mean_twist(c, before, c->believed[0], after + 3);
 #endif
     memcpy(c->believed, before, sizeof(before));
     ROLLED for (i = 0; i < 6; i++) {
@@ -338,6 +364,9 @@ static void control(omnidyn_control *c, const float *pose, const float *twist, c
 {
     float measured[6];
     int k, i, again;
+#if SUM
+    float push[3]; /* now: the steps ahead are made with that of when the output acts */
+#endif
     ROLLED for (i = 0; i < 3; i++) { /* all poses are relative to where the path begins: small numbers are exact */
         const float from = path[0].pose[i];
         float by = from - c->base[i];
@@ -364,7 +393,7 @@ static void control(omnidyn_control *c, const float *pose, const float *twist, c
 #if LEARN
     observe(c, measured, known);
     memcpy(c->x, c->believed, sizeof(measured));
-#elif AVERAGED
+#elif AVERAGED || SUM
     expect(c, measured);
     follow(c, measured, known);
     memcpy(c->x, c->believed, sizeof(measured));
@@ -376,8 +405,19 @@ static void control(omnidyn_control *c, const float *pose, const float *twist, c
 #if OMNIDYN_ELAPSED
     hold_for(c, OMNIDYN_DT);
 #endif
+#if SUM
+    memcpy(push, c->believed[2], sizeof(push));
+#endif
     for (k = 1; k <= LATE_STEPS; k++) {
+#if SUM
+        float before[6], mean[3];
+        memcpy(before, c->x[0], sizeof(before));
+#endif
         run_on(c, c->x[0], c->sent[k]);
+#if SUM
+        mean_twist(c, before, c->x[0], mean);
+        sum_up(c, c->sent[k], mean);
+#endif
     }
     stay_at_rest(c);
 #if BOUNDED
@@ -389,6 +429,9 @@ static void control(omnidyn_control *c, const float *pose, const float *twist, c
         make_stages(c);
         solve(c);
         if (--again == 0 || !has_moved(c)) {
+#if SUM
+            memcpy(c->believed[2], push, sizeof(push));
+#endif
             return;
         }
         for (k = 0; k < OMNIDYN_HORIZON; k++) { /* half-way between two predictions */
@@ -492,11 +535,6 @@ int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3],
             c->sent[LATE_STEPS][j] += PUSH[i][j] * volts;
         }
         volts *= PER_VOLT(i);
-#if WHEEL_SPEED
-        for (j = 0; j < 3 && c->known; j++) {
-            volts += SPEED_OF[i][j] * 0.5f * (c->x[0][3 + j] + c->x[1][3 + j]);
-        }
-#endif
         c->last[i] = output[i] = within(volts, OUTPUT_LIMIT(i));
     }
     return c->known && bridged ? bridged : says;

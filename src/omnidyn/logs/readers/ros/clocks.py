@@ -21,6 +21,8 @@ MOST_RESETS = 20  # times: so often no clock is set back
 SEAM = SECOND  # what is put where the true time is not known: enough for a gap
 OTHER_CLOCK = SECOND  # two times of one message differ by less, where they are of one clock
 JUMP = SECOND // 2  # of a header against the time of reception
+USUAL_SHARE = 0.9  # of the steps of a topic are usual ones
+PACE_ROWS = 20  # in a stretch that shows how fast a clock runs
 OMNIDYN_TOPICS = "/omnidyn/"  # topics that are written with the time of the row as the time of reception
 YEAR_NS = 365 * 86_400 * SECOND
 
@@ -68,16 +70,16 @@ def trusted(topics: Sequence[Clocked]) -> tuple[dict[str, IntArray], list[str]]:
         if not topic.stamped.any():
             stamps_of[topic.topic] = _as_reference(topic.receive, reference)
             continue
-        apart = topic.offset - reference.offset
-        shift = 0
+        behind = (topic.header - topic.receive)[topic.stamped]
+        there = _offsets(topic.receive[topic.stamped], reference)
+        apart, shift = int(np.median(behind - there)), 0
         if abs(apart) > OTHER_CLOCK:
-            behind = (topic.header - topic.receive)[topic.stamped]
-            shift = int(behind.max()) - (reference.offset if abs(reference.offset) > OTHER_CLOCK else 0)
+            shift = int((behind - (there if abs(reference.offset) > OTHER_CLOCK else 0)).max())
             notes.append(
                 f"{topic.topic} is stamped by another clock, {apart / 1e9:.6g} s from that of {reference.topic}: moved "
                 "by as much as its fastest message shows; what all of them take is not known"
             )
-        late = topic.receive + (topic.offset if topic.stamped.any() else 0)
+        late = topic.receive + _offsets(topic.receive, topic)
         stamps_of[topic.topic] = np.where(topic.stamped, topic.header, late) - shift
         bare = ~topic.stamped & (topic.receive != 0)
         if bare.any():
@@ -99,13 +101,24 @@ def _reference(stamped: Sequence[Clocked]) -> Clocked:
 
 def _as_reference(receive: IntArray, reference: Clocked) -> IntArray:
     """Times of reception on the clock of the stamps: as they are where the two agree, else as those of `reference`."""
-    if abs(reference.offset) <= OTHER_CLOCK:
-        return receive
-    rows = reference.stamped
-    receptions, stamps = reference.receive[rows], reference.header[rows]
+    return receive if abs(reference.offset) <= OTHER_CLOCK else receive + _offsets(receive, reference)
+
+
+def _offsets(receive: IntArray, topic: Clocked) -> IntArray:
+    """How much the stamps of a topic lie behind the times of reception, when others were received.
+
+    What is received later is stamped later: single messages that were late, or stamped wrong, do not count.
+    """
+    receptions, stamps = topic.receive[topic.stamped], topic.header[topic.stamped]
     order = np.argsort(receptions, kind="stable")
-    offsets = (stamps - receptions)[order].astype(float)
-    return receive + np.interp(receive.astype(float), receptions[order].astype(float), offsets).astype(np.int64)
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(stamps[order], 2, mode="edge"), 5)
+    receptions, stamps = receptions[order], np.maximum.accumulate(np.sort(windows, axis=1)[:, 2])
+    offsets = stamps - receptions
+    first, least = receptions[0], offsets.min()  # taken off: a float has no place for all digits since 1970
+    between = np.interp(
+        (receive - first).astype(float), (receptions - first).astype(float), (offsets - least).astype(float)
+    )
+    return least + np.rint(between).astype(np.int64)
 
 
 def _sewn(topics: Sequence[Clocked], notes: list[str]) -> list[Clocked]:
@@ -172,28 +185,54 @@ def _moved(topic: Clocked, last: int, before: int, step: int) -> Clocked:
 
 
 def _smoothed(topic: Clocked, notes: list[str]) -> Clocked:
-    """A topic whose stamps jump, while the times of reception do not: its clock was set."""
+    """A topic whose own stamps jump where the times of reception do not: its clock was set.
+
+    Stamps that are regular among themselves stay as they are, however late and at whatever pace they were received.
+    What stood before a jump is moved: rows keep their order, and no stretch lies over another one.
+    """
     rows = np.flatnonzero(topic.stamped)
-    offset = (topic.header - topic.receive)[rows]
-    jumps = np.flatnonzero(np.abs(np.diff(offset)) > JUMP)
-    jumps = np.array([k for k in jumps.tolist() if _holds(offset, k)], dtype=np.int64)
-    if not jumps.size or jumps.size > 20:
+    if len(rows) < 3:
         return topic
-    edges = [0, *(jumps + 1).tolist(), len(offset)]
-    header = topic.header.copy()
-    last = int(np.median(offset[edges[-2] :]))
-    for a, b in itertools.pairwise(edges):
-        header[rows[a:b]] += last - int(np.median(offset[a:b]))
-    largest = int(np.abs(np.diff(offset)).max())
+    header, receive = topic.header[rows], topic.receive[rows]
+    # What a stamp is behind the time of reception, as fast as the clock of the stamps runs
+    offset = header - np.rint(_pace(header, receive) * (receive - receive[0])).astype(np.int64)
+    steps, jumps = np.diff(header), np.diff(offset)
+    usual = int(np.quantile(np.abs(steps), USUAL_SHARE, method="lower"))
+    is_set = (steps < 0) & (jumps < -JUMP) | (steps > usual + JUMP) & (jumps > JUMP)
+    cuts = [k for k in np.flatnonzero(is_set).tolist() if abs(_jump(offset, k)) > JUMP]
+    if not cuts:
+        return topic
+    if len(cuts) > MOST_RESETS:
+        if (steps[cuts] > 0).all():
+            return topic
+        notes.append(f"{topic.topic}: its stamps go back too often to be a time: the times of reception are taken")
+        return replace(topic, header=np.zeros_like(topic.header))
+    moved = topic.header.copy()
+    for k in cuts:
+        shift = _jump(offset, k)
+        if not 0 < steps[k] - shift <= usual + JUMP:
+            shift = int(steps[k]) - max(1, usual)
+        moved[rows[: k + 1]] += shift
     notes.append(
-        f"{topic.topic}: its clock was set {jumps.size} time{'s' * (jumps.size > 1)}, by up to {largest / 1e9:.6g} s; "
-        "what it stamped before was moved, as the times of reception say"
+        f"{topic.topic}: its clock was set {len(cuts)} time{'s' * (len(cuts) > 1)}, by up to "
+        f"{int(np.abs(jumps[cuts]).max()) / 1e9:.6g} s; what it stamped before was moved, as the times of reception say"
     )
-    return replace(topic, header=header)
+    return replace(topic, header=moved)
 
 
-def _holds(offset: IntArray, k: int) -> bool:
-    return bool(abs(np.median(offset[k + 1 : k + 6]) - np.median(offset[max(0, k - 4) : k + 1])) > JUMP)
+def _pace(header: IntArray, receive: IntArray) -> float:
+    """How fast the clock of the stamps runs by that of the recorder: 1, or the real-time factor of a simulation.
+
+    A median over stretches: neither pauses nor a clock that was set change it.
+    """
+    stretch = max(1, min(PACE_ROWS, len(header) // 10))
+    ahead, passed = header[stretch:] - header[:-stretch], receive[stretch:] - receive[:-stretch]
+    return float(np.median(ahead[passed != 0] / passed[passed != 0])) if passed.any() else 0.0
+
+
+def _jump(offset: IntArray, k: int) -> int:
+    """How much the offsets behind row k are above those up to it, as medians of a few."""
+    return int(np.median(offset[k + 1 : k + 6]) - np.median(offset[max(0, k - 4) : k + 1]))
 
 
 def _from_1970(stamps: IntArray, notes: list[str]) -> IntArray:

@@ -1,0 +1,141 @@
+"""What a run works in: its rows, the robot, the loop in front of it, what sensors show, and room for a step."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.compiled.kernel import part
+from omnidyn.simulation.coulomb.stage import SLIDES
+
+
+class Seen(NamedTuple):
+    """What sensors show at times t - late. L latencies, K derivatives, W numbers of the way; see ../way.py.
+
+    NaN where t - late lies outside the run.
+    """
+
+    t: FloatArray  # (rows,) [s], from the start of the run
+    late: FloatArray  # (L,) [s]
+    same: float  # [s] times that differ by less are one
+    next: IntArray  # (L,) the row whose sample is next
+    order: IntArray  # (K,) the place of each derivative
+    twist: FloatArray  # (L, rows, 3)
+    pace: FloatArray  # (L, rows, 3) its time derivative
+    way: FloatArray  # (L, rows, W)
+    dtwist: FloatArray  # (L, rows, K, 3)
+    dway: FloatArray  # (L, rows, K, W)
+
+
+class Law(NamedTuple):
+    """The numbers of a robot, how they change with the first R of K parameters, and where friction acts: see law.py."""
+
+    value: FloatArray  # (SIZE,)
+    change: FloatArray  # (SIZE, R)
+    kind: int
+    memory: float  # [s] in which the slowest motion fades
+
+
+class Rows(NamedTuple):
+    """Forces held over rows [N, N, N m], and their derivatives."""
+
+    dt: FloatArray  # (rows,)
+    force: FloatArray  # (rows, 3)
+    dforce: FloatArray  # (rows, 3, K)
+
+
+class Work(NamedTuple):
+    """Room to work in: ends of the three stages, their x*, what slides in them; and the same of derivatives."""
+
+    x: FloatArray  # (3,)
+    ends: FloatArray  # (3, 3)
+    goals: FloatArray  # (3, 3)
+    slides: FloatArray  # (4, SLIDES)
+    rate: FloatArray  # (2, 3) at the start of the step and at its end
+    way: FloatArray  # (2, W) there
+    spare: FloatArray  # (3,)
+    inverse: FloatArray  # (9,)
+    d: FloatArray  # (3, K)
+    dends: FloatArray  # (3, 3, K)
+    dgoals: FloatArray  # (3, 3, K)
+    drate: FloatArray  # (2, 3, K)
+    dway: FloatArray  # (2, W, K)
+    dspare: FloatArray  # (3, K)
+
+
+def empty_seen(t: FloatArray, late: FloatArray, same: float, order: IntArray, travel: int) -> Seen:
+    """Nothing has been seen yet. travel: W."""
+    shape = (len(late), len(t))
+    return Seen(
+        np.ascontiguousarray(t - t[0]),
+        np.array(late, dtype=float),
+        same,
+        np.zeros(len(late), np.int64),
+        order,
+        np.full((*shape, 3), np.nan),
+        np.full((*shape, 3), np.nan),
+        np.full((*shape, travel), np.nan),
+        np.full((*shape, len(order), 3), np.nan),
+        np.full((*shape, len(order), travel), np.nan),
+    )
+
+
+def new_work(start: FloatArray, way: FloatArray, dstart: FloatArray) -> Work:
+    """Room for a run from a twist (3,) and a way (W,), with derivatives of the twist (3, K)."""
+    keys, travel = dstart.shape[1], len(way)
+    return Work(
+        np.array(start, dtype=float),
+        np.zeros((3, 3)),
+        np.zeros((3, 3)),
+        np.zeros((4, SLIDES)),
+        np.zeros((2, 3)),
+        np.stack([way, np.zeros(travel)]),
+        np.zeros(3),
+        np.zeros(9),
+        np.array(dstart, dtype=float),
+        np.zeros((3, 3, keys)),
+        np.zeros((3, 3, keys)),
+        np.zeros((2, 3, keys)),
+        np.zeros((2, travel, keys)),
+        np.zeros((3, keys)),
+    )
+
+
+class Loop(NamedTuple):
+    """The firmware's speed loop, and what it needs of a robot; see ../speed_loop.py. J rows.
+
+    d...: derivatives by K parameters, of numbers of the robot by the first R of them. ask and dask receive what the
+    loop asks for.
+    """
+
+    gains: FloatArray  # (4, n) kp [V s/rad], ki [V/rad], limit [V], radius [m]
+    dgains: FloatArray  # (R, 4, n)
+    wheel: FloatArray  # (n, 3) rim speeds of a twist
+    dwheel: FloatArray  # (R, n, 3)
+    drive: FloatArray  # (3, n) forces per volt
+    ddrive: FloatArray  # (R, 3, n)
+    command: FloatArray  # (J, n) [rad/s]
+    dcommand: FloatArray  # (K, J, n), or none
+    tick: BoolArray  # (J,) whether the loop runs at the start of the row; else its voltage stays
+    push: FloatArray  # (3,) wrench from outside
+    period: float  # [s]
+    dead: float  # [V] of what the loop asks for the driver passes on all but this
+    sum: FloatArray  # (n,) integral so far [V], in place
+    dsum: FloatArray  # (K, n)
+    ask: FloatArray  # (J, n) [V]
+    dask: FloatArray  # (K, J, n)
+
+
+@part
+def copy(to, source):
+    for j in range(len(to)):
+        to[j] = source[j]
+
+
+@part
+def copy_table(to, source):
+    for j in range(to.shape[0]):
+        for k in range(to.shape[1]):
+            to[j, k] = source[j, k]
