@@ -18,11 +18,12 @@ import numpy as np
 from benchmarks.batch import peers
 from benchmarks.table import Table, machine
 from omnidyn.compiled.kernel import plain
-from omnidyn.model.friction import DirectionFriction, Friction
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.batch.batch import Batch
 from omnidyn.simulation.batch.exact import exact_law
 from omnidyn.simulation.batch.sample import Sample, sample
+from omnidyn.simulation.environments.environments import Environments, Setting
 from omnidyn.simulation.exact.step import exact_step
 from omnidyn.simulation.simulate import simulate
 from tests.support.robots import TABLE_3, robot_of, table_3_voltages
@@ -82,6 +83,8 @@ def measure() -> Table:
     _others(table, laws, volts, ours, robots)
     _poses(table, robots, volts, ours)
     _implicit(table, robots.center, volts)
+    _kinds(table, along(robots.center), volts[::10])
+    _late(table, {"the paper's law": robots.center, "ellipse": along(robots.center)}, volts[::10])
     _python_loop(table, robots.center)
     _million(table, robots.center)
     _first_calls(table)
@@ -210,10 +213,68 @@ def _implicit(table: Table, center: Robot, volts: np.ndarray) -> None:
     run = batch_of(robots)
     ns = per_step(lambda: run(volts), ROBOTS, ROWS, 5)
     table.add("<= 60 ns", ns <= 60.0, what="ellipse in a turning frame, in blocks", value=ns, unit="ns")
-    limited = ellipse.replace(motor=ellipse.motor.replace(current_limit=1.5))
-    run = batch_of([limited] * 8)
-    ns = per_step(lambda: run(volts), 8, ROWS, 5)
-    table.add("<= 1500 ns", ns <= 1500.0, what="the same with a current limit, robot by robot", value=ns, unit="ns")
+
+
+def _kinds(table: Table, ellipse: Robot, volts: np.ndarray) -> None:
+    """What robots of each kind cost with poses, one step a row of 10 ms, and what that may be."""
+    way, motor, drive = ellipse.friction.direction, ellipse.motor, ellipse.drive
+    box = Friction(axes=AxesFriction(viscous=(0.9, 0.9, 0.01), coulomb=(1.2, 0.8, 0.04)))
+    disc = Friction(direction=way.replace(coulomb=(1.2, 1.2)))
+    falls = way.replace(breakaway=(1.5, 1.0), stribeck_speed=0.05)
+    duty = drive.replace(kind="duty", supply=6.0)
+    kinds = {
+        "box in a turning frame": (120.0, ellipse.replace(friction=box)),
+        "disc": (120.0, ellipse.replace(friction=disc)),
+        "ellipse": (120.0, ellipse),
+        "ellipse, duty, dead band": (120.0, ellipse.replace(drive=duty.replace(dead_band=0.3))),
+        "ellipse, latency of 13 us": (120.0, ellipse.replace(drive=drive.replace(latency=13e-6))),
+        "ellipse, speed loop of 100 Hz": (250.0, ellipse.replace(drive=drive.replace(kind="speed", kp=0.3, rate=100.0))),
+        "ellipse, current limit": (250.0, ellipse.replace(motor=motor.replace(current_limit=1.5))),
+        "ellipse, duty that coasts": (250.0, ellipse.replace(drive=duty.replace(off="coast"))),
+        "ellipse, breakaway": (3000.0, ellipse.replace(friction=Friction(direction=way.replace(breakaway=(1.5, 1.0))))),
+        "ellipse, Stribeck": (3000.0, ellipse.replace(friction=Friction(direction=falls))),
+        "friction at the wheels": (3000.0, ellipse.replace(friction=Friction(wheels=WheelFriction(coulomb=0.4)))),
+        "ellipse, unequal motors": (3000.0, ellipse.replace(motor=motor.replace(resistance=(1.6, 1.7, 1.8)))),
+        "ellipse, windings": (3000.0, ellipse.replace(motor=motor.replace(electrical="dynamic", inductance=1.1e-4))),
+        "ellipse, wheels that slip": (3000.0, ellipse.replace(wheels=ellipse.wheels.replace(traction_mu=0.5, wheel_inertia=2e-5))),
+    }
+    scale = {"voltage": 1.0, "duty": 1.0 / 6.0, "speed": 5.0}
+    command = {"voltage": "voltage", "duty": "duty", "speed": "wheel_speed_command"}
+    for name, (most, robot) in kinds.items():
+        rows = volts * scale[robot.drive.kind]
+        batch = Batch([robot] * 256, 0.01, command=command[robot.drive.kind], threads=1)
+        few = rows if "in blocks" in next(iter(batch.engines)) else rows[:40]
+        ns = per_step(lambda batch=batch, few=few: batch.run(few), 256, len(few), 3)
+        words = f"{name}, pose, rows of 10 ms: {next(iter(batch.engines))}"
+        table.add(f"<= {most:g} ns", ns <= most, what=words, value=ns, unit="ns")
+
+
+def _late(table: Table, robots: dict[str, Robot], volts: np.ndarray) -> None:
+    """What a latency of the drive costs: the same robots with and without one."""
+    for name, robot in robots.items():
+        for latency in (13e-6, 4e-3):
+            late = robot.replace(drive=robot.drive.replace(latency=latency))
+            for what, timed in (
+                ("batch, the end", lambda one: _rows_of(one, volts)),
+                ("batch, every row", lambda one: _rows_of(one, volts, every=1)),
+                ("simulate", lambda one: least(lambda: simulate(one, volts, 0.01), 5)),
+                ("environments, poses", _environment_steps),
+            ):
+                ratio = timed(late) / timed(robot)
+                words = f"{name}, latency of {latency * 1e3:g} ms, {what}: against none"
+                table.add("<= 1.5 x", ratio <= 1.5, what=words, ratio=ratio)
+
+
+def _rows_of(robot: Robot, volts: np.ndarray, **kept: Any) -> float:
+    batch = Batch([robot] * 256, 0.01, threads=1)
+    return least(lambda: batch.run(volts, **kept), 5)
+
+
+def _environment_steps(robot: Robot) -> float:
+    environments = Environments(robot, 1024, Setting("pose"))
+    environments.reset(seed=1)
+    action = np.random.default_rng(SEED).uniform(-1.0, 1.0, (1024, robot.wheels.count)).astype(np.float32)
+    return least(lambda: [environments.step(action) for _ in range(20)], 10)
 
 
 def _python_loop(table: Table, center: Robot) -> None:
