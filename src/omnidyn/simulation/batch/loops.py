@@ -27,9 +27,9 @@ from omnidyn.simulation.batch.blocks import (
     shown,
 )
 from omnidyn.simulation.batch.choice import BOX
-from omnidyn.simulation.batch.implicit import implicit_law, put_push, step_all, stages, with_share
+from omnidyn.simulation.batch.implicit import implicit_law, put_push, stages, step_all, with_share
 from omnidyn.simulation.batch.march import POSE, SPEED, TOTALS, first_failure, keep, load, spoil, store
-from omnidyn.simulation.batch.parameters import WIDTH, batch_parameters, in_blocks, out_of_blocks
+from omnidyn.simulation.batch.parameters import WIDTH, batch_parameters, in_blocks
 from omnidyn.simulation.batch.pose import ONE, SHARE
 from omnidyn.simulation.batch.threads import Threads
 from omnidyn.simulation.commands import SAME_TIME, Commands, loop_gains, on_ticks
@@ -224,7 +224,7 @@ class LoopGroup:
 
     def _pieces(self, grid: Grid, place: IntArray, known: FloatArray, span: tuple[int, int]) -> Pieces:
         """What the kernel takes, of some blocks."""
-        first, last = span[0] * WIDTH, min(span[1] * WIDTH, self.count)
+        first = span[0] * WIDTH
         lanes = np.minimum(np.arange(first, span[1] * WIDTH), self.count - 1)
         mixed, blocks = len(grid.index) > 1, span[1] - span[0]
         both = np.stack([grid.share, grid.ticks], axis=2)  # (kinds, pieces, 2)
