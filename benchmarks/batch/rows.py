@@ -228,7 +228,10 @@ def _kinds(table: Table, ellipse: Robot, volts: np.ndarray) -> None:
         "ellipse": (120.0, ellipse),
         "ellipse, duty, dead band": (120.0, ellipse.replace(drive=duty.replace(dead_band=0.3))),
         "ellipse, latency of 13 us": (120.0, ellipse.replace(drive=drive.replace(latency=13e-6))),
-        "ellipse, speed loop of 100 Hz": (250.0, ellipse.replace(drive=drive.replace(kind="speed", kp=0.3, rate=100.0))),
+        "ellipse, speed loop of 100 Hz": (
+            250.0,
+            ellipse.replace(drive=drive.replace(kind="speed", kp=0.3, rate=100.0)),
+        ),
         "ellipse, current limit that is seldom met": (250.0, ellipse.replace(motor=motor.replace(current_limit=3.0))),
         "ellipse, current limit that is often met": (3000.0, ellipse.replace(motor=motor.replace(current_limit=1.5))),
         "ellipse, duty that coasts": (250.0, ellipse.replace(drive=duty.replace(off="coast"))),
@@ -237,7 +240,10 @@ def _kinds(table: Table, ellipse: Robot, volts: np.ndarray) -> None:
         "friction at the wheels": (3000.0, ellipse.replace(friction=Friction(wheels=WheelFriction(coulomb=0.4)))),
         "ellipse, unequal motors": (3000.0, ellipse.replace(motor=motor.replace(resistance=(1.6, 1.7, 1.8)))),
         "ellipse, windings": (3000.0, ellipse.replace(motor=motor.replace(electrical="dynamic", inductance=1.1e-4))),
-        "ellipse, wheels that slip": (3000.0, ellipse.replace(wheels=ellipse.wheels.replace(traction_mu=0.5, wheel_inertia=2e-5))),
+        "ellipse, wheels that slip": (
+            3000.0,
+            ellipse.replace(wheels=ellipse.wheels.replace(traction_mu=0.5, wheel_inertia=2e-5)),
+        ),
     }
     scale = {"voltage": 1.0, "duty": 1.0 / 6.0, "speed": 5.0}
     command = {"voltage": "voltage", "duty": "duty", "speed": "wheel_speed_command"}

@@ -26,7 +26,7 @@ def late(robot, latency):
 
 
 def on_the_grid_of_commands(robot, latency):
-    """(twists, poses) at the ends of rows: whole steps from where a command acts to the next, then the rest of a row."""
+    """(twists, poses) at the ends of rows: whole steps from command to command, then the rest of a row."""
     whole = int(np.floor(latency / DT + 1e-9))
     part = max(latency - whole * DT, 0.0) if latency - whole * DT > 1e-9 * DT else 0.0
     acting = np.concatenate([np.zeros((whole + 1, 3)), VOLTS])[: ROWS + 1]
@@ -74,7 +74,9 @@ def test_implicit_steps_are_as_near_as_without_a_latency(name):
     for latency in (0.0, 0.0037, 0.0237):
         robot = late(ROBOTS[name], latency)
         run = omnidyn.simulate_batch([robot], np.repeat(VOLTS, 10, axis=0), 1e-3, every=1)
-        errors.append(np.abs(run.twists[0] - omnidyn.simulate(robot, np.repeat(VOLTS, 10, axis=0), 1e-3, tol=1e-9).twist))
+        errors.append(
+            np.abs(run.twists[0] - omnidyn.simulate(robot, np.repeat(VOLTS, 10, axis=0), 1e-3, tol=1e-9).twist)
+        )
     rms = [float(np.sqrt(np.mean(error**2))) for error in errors]
     assert rms[0] < 2e-3
     assert max(rms[1:]) < 1.3 * rms[0]

@@ -25,7 +25,9 @@ def coasting(robot, latency=0.0):
 
 @pytest.fixture(scope="module")
 def fleet():
-    return [limited(turning_robot(seed), 1.5 * 3.0 ** np.random.default_rng(seed).uniform(-1, 1)) for seed in range(200)]
+    return [
+        limited(turning_robot(seed), 1.5 * 3.0 ** np.random.default_rng(seed).uniform(-1, 1)) for seed in range(200)
+    ]
 
 
 def near(batch, robots, runs):
@@ -41,7 +43,10 @@ def test_limits_are_those_of_the_general_engine(fleet):
     batch = omnidyn.simulate_batch(fleet, VOLTS, DT, every=1)
     assert batch.engines == {"implicit engine, fixed step, in blocks": 200}
     runs = [omnidyn.simulate(robot, VOLTS, DT, tol=None) for robot in fleet]
-    met = [np.abs(run.current).max() >= robot.motor.current_limit * (1.0 - 1e-9) for run, robot in zip(runs, fleet)]
+    met = [
+        np.abs(run.current).max() >= robot.motor.current_limit * (1.0 - 1e-9)
+        for run, robot in zip(runs, fleet, strict=True)
+    ]
     assert 0.2 < np.mean(met) < 0.98
     near(batch, fleet, runs)
 

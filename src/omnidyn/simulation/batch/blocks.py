@@ -134,9 +134,9 @@ class Keeping:
 class Delays:
     """The latencies of n robots, and the volts under way to their motors.
 
-    latency = k dt + part. Over a row of dt the volts act that were asked for k + 1 rows before, up to the part, and from
-    there those of k rows before. drivers: see BlockGroup. lengths (1 or 3, n) [s]: of a whole step; where any is late,
-    of the rest of a row, and of its part too.
+    latency = k dt + part. Over a row of dt the volts act that were asked for k + 1 rows before, up to the part, and
+    from there those of k rows before. drivers: see BlockGroup. lengths (1 or 3, n) [s]: of a whole step; where any is
+    late, of the rest of a row, and of its part too.
     """
 
     def __init__(self, drivers: Sequence[tuple[Robot, Any]], count: int, dt: float) -> None:

@@ -59,7 +59,7 @@ def _shape(friction: Friction) -> str:
 
 
 def _on_axes(robot: Robot) -> Robot:
-    """The robot without turning frame and current limit, its damping all on the axes: what else stands against the exact engine stays."""
+    """The robot without turning frame and limit, its damping on the axes: what else the exact engine lacks stays."""
     way = robot.friction.direction
     damping = np.add(robot.friction.axes.viscous, (way.viscous, way.viscous, way.yaw_viscous))
     return robot.model_copy(

@@ -19,7 +19,16 @@ from numpy.typing import NDArray
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import inlined, kernel
-from omnidyn.simulation.batch.exact import BREAKAWAY, COULOMB, PER_VOLT, PHI, RATE, exact_law, put_drive, put_shared_drive
+from omnidyn.simulation.batch.exact import (
+    BREAKAWAY,
+    COULOMB,
+    PER_VOLT,
+    PHI,
+    RATE,
+    exact_law,
+    put_drive,
+    put_shared_drive,
+)
 from omnidyn.simulation.batch.march import (
     DRIVE,
     POSE,

@@ -11,10 +11,9 @@ same kernel.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import inlined, kernel, part
@@ -39,7 +38,7 @@ from omnidyn.simulation.batch.parameters import WIDTH
 from omnidyn.simulation.batch.pose import DT, END, NODE, SHARE
 from omnidyn.simulation.implicit.step import step
 
-# Rows behind the pushes of a law: damping without motors, and with them, of 3 axes; then of each wheel E g/R, 1/R, i_max
+# Rows behind the pushes of a law: damping without and with motors, of 3 axes; then of each wheel E g/R, 1/R, i_max
 FREE, BRAKED, WHEELS, PER_WHEEL = 0, 3, 6, 5
 
 
