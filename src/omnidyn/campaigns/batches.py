@@ -38,7 +38,7 @@ from omnidyn.model.motor import settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.batch.batch import Batch, simulate_batch
-from omnidyn.simulation.batch.choice import EXACT, GENERAL, VOLTAGE, engine_kind
+from omnidyn.simulation.batch.choice import BOX, DIRECTION, EXACT, GENERAL, VOLTAGE, engine_kind
 from omnidyn.simulation.batch.sample import MASS, RADIUS, Sample
 from omnidyn.simulation.engine import TOLERANCE
 
@@ -120,7 +120,7 @@ def _block(problem: Problem, first: int, size: int, start: int, stop: int) -> di
 def _fleet(problem: Problem, start: int, stop: int) -> Fleet:
     """The robots start to stop: numbers in arrays, where that is enough for blocks."""
     kind = engine_kind(problem.robot, VOLTAGE, None)
-    if kind != GENERAL and problem.keys and _scales(problem):
+    if kind in (EXACT, BOX, DIRECTION) and problem.keys and _scales(problem):
         numbers = (sample := _sample(problem, start, stop)).parameters
         if numbers is not None and (kind == EXACT or np.array_equal(numbers.coulomb, numbers.breakaway)):
             return sample

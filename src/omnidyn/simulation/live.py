@@ -135,13 +135,13 @@ class LiveRobot:
         acting = np.concatenate([self._acting[None], *(output[None] for _, output in self._under_way), rows])
         near = np.rint(acts / self.dt) * self.dt
         acts = np.where(np.abs(acts - near) <= edge, near, acts)  # so near, two times are one
-        times = np.unique(np.concatenate([edges, acts[(acts > 0.0) & (acts < edges[-1])]]))
+        times = np.unique(np.concatenate([edges, acts[(acts > 0.0) & (acts < edges[-1])]]).astype(np.float64))
         begun = acts.searchsorted(times, side="right")
         left = int(begun[-1])
         outputs = [*(output for _, output in self._under_way), *rows][left:]
         self._acting = acting[left]
         self._under_way = deque(zip((acts[left:] - edges[-1]).tolist(), outputs, strict=True))
-        return np.diff(times), acting[begun[:-1]], times.searchsorted(edges)
+        return times[1:] - times[:-1], acting[begun[:-1]], times.searchsorted(edges)
 
     def _hold(self, length: float, command: FloatArray) -> None:
         """Go on by a length of time [s] with a command held."""

@@ -88,16 +88,16 @@ def test_a_breakaway_above_its_coulomb_level_is_not_left_out(held):
 
 def test_what_has_no_block_goes_to_the_engine_of_simulate():
     robot = turning_robot(1)
-    limited = robot.replace(motor=robot.motor.replace(current_limit=1.0))
-    assert engine_kind(limited, "voltage", None) == GENERAL
+    dropping = robot.replace(motor=robot.motor.replace(voltage_drop=0.5))
+    assert engine_kind(dropping, "voltage", None) == GENERAL
     assert engine_kind(robot, "voltage", 1e-6) == GENERAL
     voltage = volts(40)
-    batch = omnidyn.simulate_batch([robot, limited, exact_robot(4)], voltage, DT, every=10)
+    batch = omnidyn.simulate_batch([robot, dropping, exact_robot(4)], voltage, DT, every=10)
     assert batch.engines == {
         "implicit engine, fixed step, in blocks": 1,
         "implicit engine, fixed step": 1,
         "exact engine, in blocks": 1,
     }
-    run = omnidyn.simulate(limited, voltage, DT, tol=None)
+    run = omnidyn.simulate(dropping, voltage, DT, tol=None)
     np.testing.assert_array_equal(batch.twists[1], run.twist[::10])
     np.testing.assert_array_equal(batch.poses[1], run.pose[::10])

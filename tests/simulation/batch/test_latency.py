@@ -26,7 +26,7 @@ def late(robot, latency):
 
 
 def on_the_grid_of_commands(robot, latency):
-    """(twists, poses) at the ends of rows: whole steps from where a command acts to the next, then the rest."""
+    """(twists, poses) at the ends of rows: whole steps from command to command, then the rest of a row."""
     whole = int(np.floor(latency / DT + 1e-9))
     part = max(latency - whole * DT, 0.0) if latency - whole * DT > 1e-9 * DT else 0.0
     acting = np.concatenate([np.zeros((whole + 1, 3)), VOLTS])[: ROWS + 1]

@@ -13,7 +13,7 @@ from omnidyn.errors import InputError
 from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.batch.blocks import EXACT_POSE, FAST_POSE, BatchCommands, BlockGroup, GroupRun, drivers_of
-from omnidyn.simulation.batch.choice import DUTY, EXACT, GENERAL, VOLTAGE, WHEEL_SPEED, engine_kind
+from omnidyn.simulation.batch.choice import BOX, DIRECTION, DUTY, EXACT, GENERAL, VOLTAGE, WHEEL_SPEED, engine_kind
 from omnidyn.simulation.batch.loops import LoopGroup
 from omnidyn.simulation.batch.parameters import batch_parameters, wheels_of
 from omnidyn.simulation.batch.result import BatchRun, BatchState, Statistics
@@ -126,10 +126,10 @@ class Batch:
     def _group(self, robots: Sequence[Robot] | Sample, dtype: Any, tol: float | None) -> list[tuple[IntArray, Any]]:
         """(indices, the group that moves those robots), one for each engine."""
         parameters = getattr(robots, "parameters", None)
-        if parameters is not None and self.command != WHEEL_SPEED:
+        if parameters is not None and self.command != WHEEL_SPEED:  # what has a limit or a loop needs its robots
             center: Robot = robots.center  # pyright: ignore[reportAttributeAccessIssue]
             kind = engine_kind(center, self.command, tol)
-            if kind == EXACT or (kind != GENERAL and np.array_equal(parameters.coulomb, parameters.breakaway)):
+            if kind == EXACT or (kind in (BOX, DIRECTION) and np.array_equal(parameters.coulomb, parameters.breakaway)):
                 _check_drive(center, self.command, self._supply)
                 self.wheels = center.wheels.count
                 turning, drivers = np.full(parameters.count, center.body.rotating_frame), [(center, slice(None))]
@@ -155,7 +155,8 @@ class Batch:
             else:
                 turning = np.array([robot.body.rotating_frame for robot in members])
                 parameters = batch_parameters(members)
-                group = BlockGroup(kind, parameters, drivers_of(members), turning, self.dt, self.pose, dtype)
+                drivers = drivers_of(members)
+                group = BlockGroup(kind, parameters, drivers, turning, self.dt, self.pose, dtype, members)
             groups.append((np.array(index), group))
         return groups
 

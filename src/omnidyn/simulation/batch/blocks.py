@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.model.actuation import clip_voltage, reaching, voltage_of_duty
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.batch.choice import BOX, DUTY, EXACT
+from omnidyn.simulation.batch.choice import BOX, DUTY, EXACT, LIMITED
 from omnidyn.simulation.batch.exact import exact_law
 from omnidyn.simulation.batch.fast import fast_law, gauss_two, march_fast
 from omnidyn.simulation.batch.implicit import implicit_law, march_implicit, stages, with_share
+from omnidyn.simulation.batch.limited import alone, distinct_plants, limited_rows, march_limited
 from omnidyn.simulation.batch.march import TOTALS, Record, Rows, march_twist
 from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters, in_blocks, out_of_blocks
 from omnidyn.simulation.batch.pose import gauss_four, march_pose, pose_law
@@ -55,8 +56,13 @@ class GroupRun(NamedTuple):
     warnings: tuple[Statement, ...] = ()
 
 
+def opens(robot: Robot, command: str) -> bool:
+    """Whether such a command of 0 lets the motors of a robot coast."""
+    return command == DUTY and robot.drive.coasts
+
+
 def reaching_volts(robot: Robot, commands: BatchCommands) -> tuple[FloatArray, BoolArray]:
-    """Volts at the motors, shape as the rows; and which commands were beyond a limit."""
+    """Volts at the motors, NaN of what coasts, shape as the rows; and which commands were beyond a limit."""
     asked, beyond = commands.rows, False
     if commands.kind == DUTY:
         duty = np.clip(commands.rows, -1.0, 1.0)
@@ -64,7 +70,10 @@ def reaching_volts(robot: Robot, commands: BatchCommands) -> tuple[FloatArray, B
         assert battery is not None
         asked, beyond = voltage_of_duty(duty, battery), duty != commands.rows
     limited = clip_voltage(robot.motor, asked)
-    return reaching(robot, limited), (limited != asked) | beyond
+    volts = reaching(robot, limited)
+    if opens(robot, commands.kind):
+        volts = np.where(asked == 0.0, np.nan, volts)
+    return volts, (limited != asked) | beyond
 
 
 def put_states(states: NDArray[Any], block: IntArray, lane: IntArray, twist: FloatArray, pose: FloatArray) -> None:
@@ -143,6 +152,7 @@ class Delays:
         self.lengths = [whole_row, whole_row - part, part] if self.late else [whole_row]
         self._kept = max(self._rows) + 1 if self.late else 0
         self._past: FloatArray | None = None  # (1 or n, rows, wheels), the latest last; None: nothing acts
+        self._idle = np.zeros(count)  # what nothing is: 0 V, or NaN of motors that coast
         self._next: FloatArray | None = None
 
     @property
@@ -156,13 +166,18 @@ class Delays:
             self._past = None
         else:
             self._past = np.broadcast_to(self._past, (self._count, *self._past.shape[1:])).copy()
-            self._past[robots] = 0.0
+            self._past[robots] = self._idle[robots, None, None]
 
-    def begin(self, shared: bool, wheels: int) -> None:
-        """Before a run under the same volts for all, or not."""
-        if self.late:
-            self._past = np.zeros((1, self._kept, wheels)) if self._past is None else self._past
-            self._next = np.empty((1 if shared else self._count, self._kept, wheels))
+    def begin(self, shared: bool, command: str, wheels: int) -> None:
+        """Before a run of such commands, under the same volts for all, or not."""
+        if not self.late:
+            return
+        for robot, index in self.drivers:
+            self._idle[index] = np.nan if opens(robot, command) else 0.0
+        if self._past is None:
+            same = len(self.drivers) == 1
+            self._past = np.tile(self._idle[: 1 if same else None, None, None], (1, self._kept, wheels))
+        self._next = np.empty((1 if shared else self._count, self._kept, wheels))
 
     def acting(self, volts: FloatArray, span: slice, places: Sequence[Any]) -> FloatArray:
         """What acts, of volts asked for, (robots, rows, wheels) of a span, or (1, ..) for all; places: of the robots of
@@ -184,12 +199,14 @@ class Delays:
     def go_on(self) -> None:
         """After a run: what is under way is what it left."""
         if self._next is not None:
-            same = len(self._next) > 1 and bool((self._next == self._next[:1]).all())
+            first = np.broadcast_to(self._next[:1], self._next.shape)
+            same = len(self._next) > 1 and np.array_equal(self._next, first, equal_nan=True)
             self._past, self._next = (self._next[:1] if same else self._next), None
 
 
 class BlockGroup:
-    """Robots in blocks. parameters: of its n robots; drivers: (robot, indices) whose driver and limits some share."""
+    """Robots in blocks. parameters: of its n robots; drivers: (robot, indices) whose driver and limits some share;
+    robots: themselves, where their motors have limits or coast."""
 
     def __init__(
         self,
@@ -200,14 +217,19 @@ class BlockGroup:
         dt: float,
         pose: str | None,
         dtype: Any,
+        robots: Sequence[Robot] = (),
     ) -> None:
         self.count = parameters.count
         self.engines = {EXACT_NAME if kind == EXACT else IMPLICIT_NAME: self.count}
         self._dtype, self._pose = np.dtype(dtype), pose
         self._delays = Delays(drivers, self.count, dt)
         self._march: Callable[..., None] = march_implicit
-        rule: tuple[Any, ...] = (stages(kind == BOX, dt, self._dtype),)
+        rule: tuple[Any, ...] = (stages(kind in (BOX, LIMITED[BOX]), dt, self._dtype),)
         law = implicit_law(parameters, turning) if kind != EXACT else np.empty(0)
+        self._plants: Any = None
+        if kind in LIMITED.values():
+            self._march, self._plants = march_limited, distinct_plants(robots)
+            law = np.concatenate([law, limited_rows(robots, parameters.damping)])
 
         def law_of(length: FloatArray) -> FloatArray:
             """The laws under steps of these lengths [s], (n,)."""
@@ -256,7 +278,8 @@ class BlockGroup:
         def march(span: tuple[int, int]) -> None:
             volts = self._own_volts(commands, span, keeping, clipped) if shared is None else shared
             moving = Rows(volts, self._states, keeping.fails, self._fresh)
-            self._march(*span, self._laws, moving, keeping.record, *self._rule)
+            room = () if self._plants is None else (alone(*self._plants),)
+            self._march(*span, self._laws, moving, keeping.record, *self._rule, *room)
 
         size = WIDTH * commands.rows[0].size
         threads.map(march, threads.spans(blocks, blocks if shared is not None else max(1, VOLTS_AT_ONCE // size)))
@@ -269,7 +292,7 @@ class BlockGroup:
         """The volts that all robots share, shape (1, steps, wheels, 1); None where each has its own."""
         drivers = self._delays.drivers
         shared = len(commands.rows) == 1 and len(drivers) == 1 and self._delays.alike
-        self._delays.begin(shared, commands.rows.shape[2])
+        self._delays.begin(shared, commands.kind, commands.rows.shape[2])
         if not shared:
             return None
         volts, beyond = reaching_volts(drivers[0][0], commands)

@@ -10,23 +10,28 @@ from omnidyn.model.robot import Robot
 from omnidyn.simulation.exact.march import why_not_exact
 
 EXACT, BOX, DIRECTION, GENERAL = "exact", "box", "direction", "general"
+LIMITED = {BOX: "box, limited", DIRECTION: "direction, limited"}  # motors with a current limit, or that coast
 VOLTAGE, DUTY, WHEEL_SPEED = "voltage", "duty", "wheel_speed_command"
 NO_FRICTION = (0.0, 0.0, 0.0)
 
 
 def engine_kind(robot: Robot, command: str, tol: float | None) -> str:
     """EXACT: blocks by the exact formula. BOX, DIRECTION: blocks of fixed implicit steps, friction of the axes or along
-    the direction of travel. GENERAL: the engine of `simulate`, robot by robot.
+    the direction of travel; LIMITED: the same of motors with a current limit, or that coast. GENERAL: the engine of
+    `simulate`, robot by robot.
 
     command: what is given. tol [m/s]: of an engine that is not exact, None for one fixed step a row.
     """
-    if (command == DUTY and robot.drive.coasts) or robot.motor.electrical == DYNAMIC:
+    if robot.motor.electrical == DYNAMIC:
         return GENERAL
-    if command != WHEEL_SPEED and not why_not_exact(robot):
+    limited = robot.motor.current_limit is not None or (command == DUTY and robot.drive.coasts)
+    if command != WHEEL_SPEED and not limited and not why_not_exact(robot):
         return EXACT
     shape = _shape(robot.friction)
     if tol is not None or shape == GENERAL or why_not_exact(_on_axes(robot)):
         return GENERAL
+    if limited:
+        return GENERAL if command == WHEEL_SPEED else LIMITED[shape]
     return shape
 
 
@@ -54,12 +59,13 @@ def _shape(friction: Friction) -> str:
 
 
 def _on_axes(robot: Robot) -> Robot:
-    """The robot without turning frame, its damping all on the axes: what else stands against the exact engine stays."""
+    """The robot without turning frame and limit, its damping on the axes: what else the exact engine lacks stays."""
     way = robot.friction.direction
     damping = np.add(robot.friction.axes.viscous, (way.viscous, way.viscous, way.yaw_viscous))
     return robot.model_copy(
         update={
             "body": robot.body.model_copy(update={"rotating_frame": False}),
+            "motor": robot.motor.model_copy(update={"current_limit": None}),
             "friction": Friction(axes=AxesFriction(viscous=tuple(damping.tolist()), coulomb=NO_FRICTION)),
         }
     )

@@ -16,8 +16,11 @@ from omnidyn.simulation.exact.step import exact_step
 COULOMB, BREAKAWAY, RATE, PHI, PER_VOLT = 0, 3, 6, 9, 12  # first rows of a law
 
 
-def exact_law(parameters: BatchParameters, dt: float) -> FloatArray:
-    """The laws of robots under steps of dt [s]: rows for `in_blocks`. Shape (PER_VOLT + 3 wheels, n)."""
+def exact_law(parameters: BatchParameters, dt: float | FloatArray) -> FloatArray:
+    """The laws of robots under steps of dt [s], one for all or (n,): rows for `in_blocks`.
+
+    Shape (PER_VOLT + 3 wheels, n).
+    """
     mass, count = parameters.mass, parameters.count
     rate = parameters.damping / mass
     per_volt = parameters.push / mass[:, None]

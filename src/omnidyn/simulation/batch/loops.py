@@ -190,7 +190,7 @@ class LoopGroup:
             march_loops(*span, self._laws, self._gains, pieces, moving, keeping.record, self._rule)
 
         blocks = len(self._laws)
-        alone = len(known) == 1 and len(grid.index) == 1
+        alone = len(known) == 1 and len(grid.command) == 1
         size = WIDTH * grid.share.shape[1] * known.shape[2]
         threads.map(march, threads.spans(blocks, blocks if alone else max(1, VOLTS_AT_ONCE // size)))
         past, self._done = known[:, known.shape[1] - self._kept :], self._done + steps
@@ -224,17 +224,16 @@ class LoopGroup:
 
     def _pieces(self, grid: Grid, place: IntArray, known: FloatArray, span: tuple[int, int]) -> Pieces:
         """What the kernel takes, of some blocks."""
-        first = span[0] * WIDTH
-        lanes = np.minimum(np.arange(first, span[1] * WIDTH), self.count - 1)
-        mixed, blocks = len(grid.index) > 1, span[1] - span[0]
+        lanes = np.minimum(np.arange(span[0] * WIDTH, span[1] * WIDTH), self.count - 1)
+        mixed, blocks = len(grid.command) > 1, span[1] - span[0]
         both = np.stack([grid.share, grid.ticks], axis=2)  # (kinds, pieces, 2)
         chosen = both[place[lanes]] if mixed else np.repeat(both, WIDTH, axis=0)
         steps = chosen.reshape(blocks if mixed else 1, WIDTH, *both.shape[1:]).transpose(0, 2, 3, 1)
         if len(known) == 1 and not mixed:
-            points = known[0, grid.index[0]][None, :, :, None]
+            points = known[0, grid.command[0]][None, :, :, None]
         else:
             own = known if len(known) > 1 else np.broadcast_to(known, (self.count, *known.shape[1:]))
-            taken = np.take_along_axis(own[lanes], grid.index[place[lanes]][:, :, None], axis=1)
+            taken = np.take_along_axis(own[lanes], grid.command[place[lanes]][:, :, None], axis=1)
             points = taken.reshape(blocks, WIDTH, *taken.shape[1:]).transpose(0, 2, 3, 1)
         return Pieces(
             np.ascontiguousarray(steps, self._dtype), np.ascontiguousarray(points, self._dtype), grid.row_ends, mixed
@@ -247,7 +246,7 @@ class Grid(NamedTuple):
 
     share: FloatArray
     ticks: FloatArray
-    index: IntArray
+    command: IntArray
     row_ends: IntArray
 
 

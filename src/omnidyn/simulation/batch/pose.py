@@ -44,8 +44,10 @@ ONE, HALF, MORE, DT, FAST = range(12, 17)  # places in `numbers`
 
 
 class GaussFour(NamedTuple):
-    """The rule of an exact pose. times, weights (4,) [s]; numbers: SERIES, then 1, 1/2, 3/2, h [s], and PIECE/h [1/s],
-    from which on a step is a fast one; all in the type of the batch. gauss: nodes and weights of the scalar engine.
+    """The rule of an exact pose. times, weights (4,) [s].
+
+    numbers: SERIES, then 1, 1/2, 3/2, h [s], and PIECE/h [1/s], from which on a step is a fast one; all in the type of
+    the batch. gauss: nodes and weights of the scalar engine.
     """
 
     times: NDArray[Any]
