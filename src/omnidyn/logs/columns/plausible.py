@@ -36,9 +36,10 @@ MOST_VOLTS = 100.0  # [V] of a motor's driver, or of a battery; more are other u
 VOLTS = Range(MOST_VOLTS, (3.0, 60.0), ("mV", "cV", "dV"), "V/COUNTS_PER_VOLT")
 SPEED = Range(20.0, (0.05, 6.0), ("mm/s", "cm/s", "in/s"))
 LENGTH = Range(500.0, (0.3, 50.0), ("mm", "cm", "in"))
+CURRENT = Range(200.0, (0.05, 60.0), ("mA",), "A/COUNTS_PER_AMPERE")
 RANGES = {
     "supply": VOLTS,
-    "i": Range(200.0, (0.05, 60.0), ("mA",), "A/COUNTS_PER_AMPERE"),
+    "i": CURRENT,
     "w": Range(3000.0, (1.0, 500.0), ("rpm", "deg/s"), "ticks/COUNTS_PER_TURN/s", math.inf),
     "vx": SPEED,
     "vy": SPEED,
@@ -63,11 +64,12 @@ def beyond_range(
     """The doubt, of no column yet, about values that a component cannot have in their unit; None where it can.
 
     limit: the most that a driver of the robot gives [V], where it is known. is_given: whether the file gives the unit.
-    Of a position the span counts, for its origin may be anywhere; one in a unit that is given may be far away.
+    Of a position the span counts, for its origin may be anywhere; one in a unit that is given may be far away. A current
+    in a unit that is given is judged by the motors: findings/scale.
     """
     letter = letter_of(component.removesuffix("_cmd"))
     limits, values = RANGES.get(letter), values[np.isfinite(values)]
-    if limits is None or not values.size or (limits is LENGTH and is_given):
+    if limits is None or not values.size or (limits in (LENGTH, CURRENT) and is_given):
         return None
     if limits is LENGTH:
         size = float(np.diff(np.quantile(values, [1.0 - USUAL_SHARE, USUAL_SHARE]))[0])

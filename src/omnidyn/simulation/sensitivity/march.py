@@ -156,7 +156,10 @@ def _adaptive(
     remaining = dt
     counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
     while remaining > 0.0:
-        length, h = find_step(plant, stage, spare, state, h, remaining, dt, tol, counts)
+        tried = h
+        length, h = find_step(plant, stage, spare, state, tried, remaining, dt, tol, counts)
+        if length == remaining:  # as implicit._row: the end of the row may have cut it short, not its error
+            h = max(h, tried)
         copy_state(settled, two)
         if sticks(settled):
             counts[0] = max(counts[0], settle(plant, stage, bare, settled, along.gained))
