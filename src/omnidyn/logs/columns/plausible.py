@@ -64,8 +64,8 @@ def beyond_range(
     """The doubt, of no column yet, about values that a component cannot have in their unit; None where it can.
 
     limit: the most that a driver of the robot gives [V], where it is known. is_given: whether the file gives the unit.
-    Of a position the span counts, for its origin may be anywhere; one in a unit that is given may be far away. A current
-    in a unit that is given is judged by the motors: findings/scale.
+    Of a position the span counts, for its origin may be anywhere; one in a unit that is given may be far away. The
+    motors judge a current in a unit that is given: findings/scale.
     """
     letter = letter_of(component.removesuffix("_cmd"))
     limits, values = RANGES.get(letter), values[np.isfinite(values)]

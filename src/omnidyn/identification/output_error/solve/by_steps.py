@@ -10,7 +10,7 @@ from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import MAX_ITERATIONS, NEAR_PRECISION, Solution, Solver
 
 HALFWAY_TOLERANCE = 3e-4  # [m/s] on the way there
-FIT_PRECISION = 2.5e-3  # squared distance to the best point, in standard errors, at which a fit ends
+FIT_PRECISION = 1e-4  # squared distance to the best point, in standard errors, at which a fit ends
 
 
 def solve_by_steps(

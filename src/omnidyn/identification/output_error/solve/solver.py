@@ -16,6 +16,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.engine import Engine, P, Weighting
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
+from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Fitted, PieceSums, Point, per_column
 from omnidyn.identification.output_error.solve.normal_equations import (
     SPEED_LIMITS,
@@ -109,7 +110,9 @@ class Solver(Generic[P]):
     ):
         self.problem, self.engine, self.nu, self.close, self.counted = problem, engine, nu, precision, counts_ticks
         is_exact = precision <= END_PRECISION  # or a speed loop, which may creep for long, and yet find its way
-        self.creep, self._scatter = (0.0, 0.0) if is_exact else (max(CREEP * precision, 2.0 * SCATTER), SCATTER)
+        adds_up = any(name in TRAVELS for name, _ in problem.columns)  # what speeds are off by scatters F
+        self._scatter = 0.0 if is_exact or not adds_up else SCATTER
+        self.creep = 0.0 if is_exact else max(CREEP * precision, 2.0 * self._scatter)
         self._kink = max(KINK_PRECISION, precision, 2.0 * self._scatter)  # F would change by less than it scatters
         self.tick = problem.tick if counts_ticks else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
