@@ -47,6 +47,7 @@ MOVING_SHARE = 0.1  # of the rows at least: else the log has too little motion t
 SMALL_STEP_SHARE = 0.1  # of an odd step: a smaller one beside it does not matter
 TOP_SPEED = 2000.0  # [turns/s] no motor turns faster
 LATE_STEP = 1.5  # usual steps of time: a longer one hides what the wheel did
+MOST_DECADES = 300.0  # of ticks: more is no number
 
 
 class Unrolled(NamedTuple):
@@ -235,7 +236,7 @@ def _plainest(period: float, doubt: float, width: float, turn: float, tick: floa
     choices = [(turns, turn)]
     if tick > 0.0:
         power = tick * 2.0 ** np.round(np.log2(period / tick))
-        decades = tick * 10.0 ** np.arange(np.floor(np.log10(period / tick)), -1.0, -1.0)
+        decades = tick * 10.0 ** np.arange(min(np.floor(np.log10(period / tick)), MOST_DECADES), -1.0, -1.0)
         choices += [(power, power), *((decade * np.round(period / decade), decade) for decade in decades)]
     for value, apart in choices:
         tolerance = min(DOUBT * period, DOUBT_SHARE * apart, 5.0 * doubt + TICKS * tick)

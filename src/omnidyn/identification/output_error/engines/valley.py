@@ -17,6 +17,7 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 
+LEAST_SHARE = 1e-3  # of its lower bound: a number that is a logarithm never becomes 0 on the way
 EPS = 1e-5  # change of a number that the solver sees, relative
 RANK = 1e-7  # share of the largest singular value below which a direction shows in none of the sums
 ROUNDS = 3  # of Newton's method: each leaves the square of what was left
@@ -30,7 +31,9 @@ def bent(problem: Problem, inner: FloatArray, step: FloatArray) -> FloatArray:
         return step
 
     def at(numbers: FloatArray) -> FloatArray:
-        return _sums(problem.robot_at(np.array([p.outer(float(z)) for p, z in zip(parameters, numbers, strict=True)])))
+        values = [p.outer(float(z)) for p, z in zip(parameters, numbers, strict=True)]
+        values = [max(v, LEAST_SHARE * p.low) if p.log else v for p, v in zip(parameters, values, strict=True)]
+        return _sums(problem.robot_at(np.array(values)))
 
     start, sizes = at(here), EPS * np.maximum(np.abs(here), 1e-3)
     changes = [at(here + move) - at(here - move) for move in np.diag(sizes)]
