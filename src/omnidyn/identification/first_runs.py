@@ -45,6 +45,8 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
     falling_robot = paper.replace(friction=paper.friction.replace(axes=falls))
     held = mecanum.replace(friction=mecanum.friction.replace(wheels=WheelFriction(coulomb=1.0)))
     held_loop = loop_robot.replace(friction=held.friction)
+    lekiwi = load_robot("lekiwi")
+    limited = lekiwi.replace(motor=lekiwi.motor.replace(current_limit=1.0))
     winding = four.replace(motor=four.motor.replace(electrical=DYNAMIC, inductance=1e-3))
     return [
         ("simulation, friction of the axes", partial(_run, paper)),
@@ -68,12 +70,15 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("batch, twist alone", partial(_batch, paper, None)),
         ("batch, fast poses", partial(_batch, paper, "fast")),
         ("batch, exact poses", partial(_batch, paper, "exact")),
-        ("batch, friction of the direction of travel", partial(_batch, load_robot("lekiwi"), "exact")),
+        ("batch, friction of the direction of travel", partial(_batch, lekiwi, "exact")),
+        ("batch, a limit of the current", partial(_batch, limited, None)),
+        ("batch, speed loops", partial(_batch, lekiwi, None, "wheel_speed_command")),
     ]
 
 
-def _batch(robot: Robot, pose: str | None) -> BatchRun:
-    return simulate_batch([robot], np.zeros((1, robot.wheels.count)), DT, pose=pose)
+def _batch(robot: Robot, pose: str | None, command: str = "voltage") -> BatchRun:
+    commands: dict[str, Any] = {command: np.zeros((1, robot.wheels.count))}
+    return simulate_batch([robot], dt=DT, pose=pose, **commands)
 
 
 def shared_out(robot: Robot) -> AbstractContextManager[None]:

@@ -24,7 +24,8 @@ class CompareTab:
     def build(self) -> None:
         """Lay it out."""
         page = self.page
-        page.part(self._choice, LOGS, ROBOT)
+        page.part(self._robots, ROBOT)  # apart: a log that was just read takes no choice away
+        page.part(self._logs, LOGS)
         page.part(self._start, COMPARE, COMPARE_START, LOGS, ROBOT)
         page.progress(COMPARE, lambda: self.comparing.last, self.session.workers[COMPARE])
         page.part(self._result, COMPARE)
@@ -34,8 +35,8 @@ class CompareTab:
         page.progress(DRIFT, lambda: self.comparing.last_drift, self.session.workers[COMPARE])
         page.part(self._drift, DRIFT)
 
-    def _choice(self) -> None:
-        """Robots and logs."""
+    def _robots(self) -> None:
+        """Choices of robots, and more of them."""
         comparing, session = self.comparing, self.session
         first, second = comparing.robots
         with ui.row().classes("line"):
@@ -52,6 +53,10 @@ class CompareTab:
                 on_change=lambda e: comparing.choose(1, e.value),
             ).classes("wide robot-b")
             ui.element("omni-drop").props(f"kind={FIT} words='Drop robot files or fits (.toml), or click'")
+
+    def _logs(self) -> None:
+        """Which of the logs."""
+        comparing, session = self.comparing, self.session
         if len(session.logs) > 1:
             ui.select(
                 {key: log.label for key, log in session.logs.items()},
