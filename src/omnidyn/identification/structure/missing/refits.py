@@ -33,6 +33,8 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver, S
 from omnidyn.identification.structure.missing.candidates import CHANGE, Candidate, Fitted, Trial
 from omnidyn.identification.structure.missing.switches import Switch, as_fitted, simpler_first, switches
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
+from omnidyn.model.stick_slip.plant import plant
+from omnidyn.simulation.sensitivity.late_sample import is_steep
 
 BEST = 3  # candidates that are fitted beside the shapes
 FIT_PRECISION = 0.1  # squared standard errors to the best point that are enough to compare
@@ -68,7 +70,8 @@ def refits(
 ) -> dict[str, tuple[Candidate, list[Trial]]]:
     """Key -> a candidate with what a fit with it shows. problem, parts: what was fitted, its rows at the best point.
 
-    ranking: by columns near the fit. Nothing of wheels that slip, whose fits take as long as all else.
+    ranking: by columns near the fit. Nothing of wheels that slip, nor of friction that takes many steps a row, whose
+    fits take as long as all else.
     """
     if problem.robot.wheels.traction_mu is not None:
         return {}
@@ -85,8 +88,11 @@ def refits(
         errors_by_kind = {kind: _by_coarse_steps(problem, parts, point, kind) for kind in kinds}
     except OmnidynError:  # a nuisance that the implicit engine does not know
         return {}
+    row = min(float(np.median(np.diff(piece.record.t))) for piece in problem.pieces)
     for candidate, remedy in _asked(ranking, candidates):
-        for way in switches(remedy, problem.robot, _question(problem), solution):
+        for way in switches(remedy, problem.robot, _question(problem), solution, moves_priors=True):
+            if is_steep(plant(way.robot), row):
+                continue
             try:
                 begun_fits.append(_begun(candidate, way, problem, solution, errors_by_kind).gone_on(STEPS))
             except OmnidynError:  # no engine simulates it, or nothing is left to be fitted
@@ -167,7 +173,9 @@ def _begun(
     exact = not coarse_kind.has_loop and is_exact(way.robot) and stays_exact(way.robot, keys)
     kind = ExactEngine if exact and (not is_decimated or ExactEngine in errors_by_kind) else coarse_kind
     new_problem = make_problem(records, way.robot, replace(way.question, free=keys), kind)
-    new_problem = replace(new_problem, pieces=problem.pieces)
+    prior_by_name = {p.name: p.prior for p in problem.parameters}  # of the robot file, not of where the fit ended
+    parameters = tuple(replace(p, prior=prior_by_name.get(p.name, p.prior)) for p in new_problem.parameters)
+    new_problem = replace(new_problem, parameters=parameters, pieces=problem.pieces)
     values_before, values = _values(problem, solution), np.array([p.value for p in new_problem.parameters])
     for k, name in enumerate(new_problem.names[new_problem.robot_count :], new_problem.robot_count):
         values[k] = values_before.get(name, values[k])  # numbers of the robot stand in it where they were found

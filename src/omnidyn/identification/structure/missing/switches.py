@@ -1,7 +1,7 @@
 """A remedy switched on: the robot and the question with it, ready to be fitted; what a fit cannot hold has none.
 
-A number begins at the size of its first step. All that was fitted before stays free, and begins where it was found,
-but for what has a prior: that would move with it.
+A number begins at the size of its first step. All that was fitted before stays free, and begins where it was found. A
+prior is that of the value in the robot file: where the fit is made from the file, what has one begins there.
 """
 
 from __future__ import annotations
@@ -74,12 +74,16 @@ class Switch:
     numbers: int = 0
 
 
-def switches(remedy: Remedy, robot: Robot, question: OutputError, solution: Solution) -> list[Switch]:
+def switches(
+    remedy: Remedy, robot: Robot, question: OutputError, solution: Solution, *, moves_priors: bool = False
+) -> list[Switch]:
     """The ways in which a remedy can be switched on; none where no robot file and no fit holds it.
 
-    robot, question: of the fit before, and `solution` what it came to.
+    robot, question: of the fit before, and `solution` what it came to. moves_priors: whether what has a prior is where
+    it was found, too; whoever fits the robot then says what the priors are.
     """
-    start, settled_question = _where_it_ended(robot, solution), _as_it_settled(robot, question, solution)
+    start = _where_it_ended(robot, solution, moves_priors)
+    settled_question = _as_it_settled(robot, question, solution)
     try:
         return [_as_far_as_profiled(way, solution) for way in _ways(remedy, start, settled_question)]
     except OmnidynError:  # a size that no robot file may have
@@ -154,13 +158,13 @@ def _ways(remedy: Remedy, robot: Robot, question: OutputError) -> Iterator[Switc
         yield Switch(_as_one(robot, key), _free(question, key), cause)
 
 
-def _where_it_ended(robot: Robot, solution: Solution) -> Robot:
-    """The robot with what was fitted, but for numbers with a prior, and what a wrong model drove to a bound."""
+def _where_it_ended(robot: Robot, solution: Solution, moves_priors: bool = False) -> Robot:
+    """The robot with what was fitted, but for what a wrong model drove to a bound, and numbers with a prior."""
     problem = solution.solver.problem
     for p, value, is_held in zip(
         problem.robot_parameters, solution.state.point.values.tolist(), solution.held_parameters, strict=False
     ):
-        if p.prior is None and not is_held:
+        if (p.prior is None or moves_priors) and not is_held:
             robot = p.on(robot, value)
     return robot.replace(friction=holding(robot, levels_of(solution)).friction.replace())
 
