@@ -1,8 +1,8 @@
 """What other tools of Python read and give: functions on a Run, so that run.py knows none of them.
 
 dataframe: pandas and polars, of a Run, an Estimate, a Comparison. dataset: xarray. runs: a Run from any of these.
-systems: python-control. kinds: which files of other tools are read as a robot; robot_json, urdf,
-mjcf: how; parts: a robot from masses and axles.
+systems: python-control. gymnasium: environments. kinds: which files of other tools are read as a robot; robot_json,
+urdf, mjcf: how; parts: a robot from masses and axles.
 """
 
 from __future__ import annotations

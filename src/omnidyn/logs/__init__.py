@@ -2,8 +2,8 @@
 
 read_log is the door, log what a file holds by channel (channels, column); on the way: readers/ (formats), table/
 (text), columns/ (which column is what), clock/ (time and counters). Then what is made from a Run: segments, plateaus,
-resolved, geometry (where the wheels stand). Other files with a fixed form: run_file, mcap_run, command_file,
-steady_table.
+resolved, path (where it went), geometry (where the wheels stand). info: what a file holds, before. Other files with a
+fixed form: run_file, mcap_run, command_file, steady_table, motor_table.
 
 Words: a segment lies between two gaps in time, a hold is a stretch over which the commands stand still, a plateau a
 steady window as one point, a window so many rows or seconds; a block is a part of a long file, read at once. Readers

@@ -2,5 +2,5 @@
 
 Read in this order: model (the numbers of a robot), stages and program (of one step), riccati (one solve),
 interior_point (to the optimum, by an active set where that does), observer, settings, loop (one step of the
-controller), controller.
+controller), controller. small: vectors of 3 in registers.
 """

@@ -1,5 +1,5 @@
 """ROS 2.
 
-ros2_control: the files for omni_wheel_drive_controller, with the URDF whose joints turn as that controller has it.
-node: a node that drives the robot, as text.
+ros2_control: the files for the controllers of drive_controller, with the URDF whose joints turn as those have it.
+node: a node that drives the robot, as text. package: what makes a folder one that colcon builds.
 """

@@ -1,1 +1,2 @@
-"""What all checks stand on: robust, log_under_check, reference (a channel told by others)."""
+"""What all checks stand on: robust, log_under_check, clocks (rows of one sensor), reference (a channel told by
+others)."""

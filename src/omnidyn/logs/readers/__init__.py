@@ -1,6 +1,7 @@
-"""One file or room per format: text (a row for every value, too), parquet (with parquet_pages), ros (bags, MCAP),
-wpilib, matlab. read_table tells them by content, reader is the contract. Where topics have clocks of their own:
-recording (what a file holds, to Tables) and claims (which topic gives a component).
+"""One file or room per format: text (a row for every value, too), parquet (with parquet_pages), lerobot, ros (bags,
+MCAP), wpilib (wpilog), matlab; folders (a log in several files). read_table tells them by content, reader is the
+contract. Where topics have clocks of their own: recording (what a file holds, to Tables) and claims (which topic gives
+a component).
 
 The contract of a reader, the value `Reader` of its file, entered in `READERS` of read_table:
 

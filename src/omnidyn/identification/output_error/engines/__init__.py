@@ -1,1 +1,2 @@
-"""The model in place of the robot: engine (the contract), exact, implicit, speed_loop."""
+"""The model in place of the robot: engine (the contract), exact, implicit, speed_loop; valley (where motors are
+guesses)."""

@@ -1,6 +1,7 @@
 """What is fitted to what.
 
 parameters and primitives (from them to numbers of the step), friction_laws (of which numbers need care), record (a
-log), outputs (channels, those computed from others too), starts (where friction begins), nuisances (what the log does),
-problem (all of it).
+log), outputs (channels, those computed from others too), differences (of counts, added up), heading (where the robot
+faces), starts (where friction begins), nuisances (what the log does), problem (all of it), decimated (its means over
+some rows).
 """

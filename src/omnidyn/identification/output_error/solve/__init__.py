@@ -1,1 +1,2 @@
-"""To the minimum: solver, steps (bends, edges and order of numbers), first_point, loop (firmware loops), progress."""
+"""To the minimum: solver (on normal_equations), by_steps (coarse, then fine), steps (bends, edges and order of
+numbers), first_point, loop (firmware loops), progress."""
