@@ -184,8 +184,8 @@ class Coulomb(_Stepping):
 
     @staticmethod
     def serves(robot: Robot, conditions: Conditions) -> bool:
-        """At a tolerance, while no motor coasts."""
-        if conditions.coasting or conditions.tilt or conditions.fixed:
+        """At a tolerance."""
+        if conditions.tilt or conditions.fixed:
             return False
         return robot.wheels.traction_mu is None and moved(plant(robot), [], 1.0) is not None
 
@@ -221,7 +221,9 @@ class Coulomb(_Stepping):
             rows = rows._replace(voltage=run_of_loop.ask, loop=rows.loop._replace(sum=run_of_loop.sum))
         else:
             push = None if self._push is None else np.tile(self._push, (len(rows.dt), 1))
-            seen = run(self._moved, edges, rows.dt, rows.voltage, twist, step, self._tol, late, way, push)
+            seen = run(
+                self._moved, edges, rows.dt, rows.voltage, twist, step, self._tol, late, way, push, bound=rows.bound
+            )
         twists, poses = seen.twist[0], seen.way[0][:, [PATH, PATH + 1, 0]]
         twists[0], poses[0] = twist, pose
         volts, loop_volts = self._volts(rows, looped)

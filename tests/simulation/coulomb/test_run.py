@@ -29,6 +29,10 @@ BACKWARD = AxesFriction(viscous=(2.0, 3.0, 0.05), coulomb=(14.0, 11.0, 1.4), cou
 UNEQUAL = (1.1, 1.2, 1.35, 1.2)
 
 
+def limited(robot, most):
+    return robot.replace(motor=robot.motor.replace(current_limit=most))
+
+
 def ordinary(friction, azimuth=(45.0, 135.0, 225.0, 315.0), resistance=1.2, inertia=0.12, frame=True):
     """A robot as `init` writes it: four wheels, a turning frame."""
     motor = AXEBOT.motor.replace(
@@ -54,6 +58,10 @@ ROBOTS = {
     "unequal motors, box": ordinary(BOX, resistance=UNEQUAL),
     "yaw of 2 ms": ordinary(ELLIPSE, inertia=0.004),
 }
+ROBOTS |= {
+    f"{name}, at most {most:g} A": limited(ROBOTS[name], most)
+    for name, most in (("ellipse", 1.5), ("box", 4.0), ("unequal motors", 2.5), ("three wheels", 1.5))
+}
 
 
 def program(robot, rows, seed=0):
@@ -69,6 +77,8 @@ def program(robot, rows, seed=0):
 def keys_of(robot):
     keys = ["body.mass_kg", "body.inertia_kg_m2", "motor.torque_constant_Nm_A", "wheels.wheel_radius_m"]
     keys += ["wheels.robot_radius_m"]
+    if robot.motor.current_limit:
+        keys += ["motor.current_limit_A"]
     direction = robot.friction.direction.coulomb[0] > 0.0
     if direction:
         return [*keys, *(f"friction.direction.{name}" for name in ("coulomb[0]", "coulomb[1]", "viscous", *YAW))]
@@ -166,6 +176,45 @@ def test_derivatives_by_volts_pushes_and_the_start_are_differences():
             assert np.abs(found - by).max() <= 2e-3 * np.abs(by).max(), name
 
 
+@pytest.mark.parametrize("name", ["ellipse", "box", "unequal motors, at most 2.5 A"])
+def test_motors_coast_as_in_the_general_engine(name):
+    """A duty of 0 leaves a motor without current, one or all; derivatives too."""
+    robot = ROBOTS[name]
+    robot = robot.replace(drive=robot.drive.replace(kind="duty", supply=12.0, off="coast"))
+    random = np.random.default_rng(5)
+    duty = np.repeat(random.uniform(-0.8, 0.8, (25, 4)) * (random.random((25, 4)) < 0.7), 10, axis=0)
+    duty[100:120] = 0.0
+    keys = [key for key in keys_of(robot) if "limit" not in key]
+    found = derivatives(robot, duty=duty, dt=0.01, keys=keys, tol=1e-7)
+    true = derivatives(implicit(robot), duty=duty, dt=0.01, keys=keys, tol=1e-8)
+    assert "Coulomb engine" in found.run.source
+    assert np.abs(found.run.twist - true.run.twist).max() <= 1e-6
+    assert np.abs(found.run.current - true.run.current).max() <= 1e-5
+    assert (found.run.current[:-1][duty == 0.0] == 0.0).all()
+    size = np.sqrt((true.twist**2).sum(axis=(0, 1)))
+    off = np.sqrt(((found.twist - true.twist) ** 2).sum(axis=(0, 1))) / size
+    assert off.max() <= 1e-3
+    assert np.median(off) <= 1e-4
+
+
+def test_a_speed_loop_whose_motors_meet_their_limit():
+    robot = ROBOTS["ellipse, at most 1.5 A"]
+    robot = robot.replace(drive=robot.drive.replace(kind="speed", kp=0.5, ki=3.0, rate=100.0))
+    speeds = np.repeat(np.random.default_rng(6).uniform(-12.0, 12.0, (10, 4)), 25, axis=0)
+    run = simulate(robot, wheel_speed_command=speeds, dt=0.01, tol=1e-6)
+    true = simulate(implicit(robot), wheel_speed_command=speeds, dt=0.01, tol=1e-8)
+    assert "Coulomb engine" in run.source
+    assert (np.abs(run.current) > 1.499).mean() > 0.2
+    assert (np.abs(run.twist - true.twist) / [1.0, 1.0, 10.0]).max() <= 1e-6
+    keys = keys_of(robot)
+    found, right = (
+        derivatives(r, wheel_speed_command=speeds, dt=0.01, keys=keys, tol=tol)
+        for r, tol in ((robot, 1e-7), (implicit(robot), 1e-8))
+    )
+    size = np.sqrt((right.twist**2).sum(axis=(0, 1)))
+    assert (np.sqrt(((found.twist - right.twist) ** 2).sum(axis=(0, 1))) <= 2e-3 * size).all()
+
+
 def test_what_other_laws_ask_for_is_left_to_the_general_engine():
     """A robot that this room does not know is never taken for one that it knows."""
     robot = ROBOTS["ellipse"]
@@ -176,7 +225,6 @@ def test_what_other_laws_ask_for_is_left_to_the_general_engine():
         "Stribeck": robot.replace(
             friction=Friction(direction=ELLIPSE.replace(breakaway=(15.0, 12.0), stribeck_speed=0.01))
         ),
-        "limit": robot.replace(motor=robot.motor.replace(current_limit=3.0)),
         "drop": robot.replace(motor=robot.motor.replace(voltage_drop=0.1)),
         "gear": robot.replace(motor=robot.motor.replace(gear_efficiency=0.9)),
         "centre": robot.replace(body=robot.body.replace(centre=(0.01, 0.0))),

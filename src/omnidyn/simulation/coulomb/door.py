@@ -10,7 +10,17 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.layout import N_AXES, Plant, many
-from omnidyn.simulation.coulomb.law import couples, drives_of, is_coulomb, kind_of, laws_of, rims_of
+from omnidyn.simulation.coulomb.law import (
+    DAMPING,
+    TURNING,
+    couples,
+    drives_of,
+    is_coulomb,
+    kind_of,
+    laws_of,
+    rims_of,
+    wheels_of,
+)
 from omnidyn.simulation.coulomb.run import run_loop, run_rows
 from omnidyn.simulation.coulomb.state import Law, Loop, Rows, Seen, empty_seen, new_work
 from omnidyn.simulation.speed_loop import LoopCommands
@@ -29,6 +39,14 @@ class Moved(NamedTuple):
     drive_change: FloatArray  # (R, 3, n)
     rim: FloatArray  # (n, 3)
     rim_change: FloatArray  # (R, n, 3)
+    limit: FloatArray  # (n,) of currents [A]
+    bounded: Law  # the same with its motors one by one
+
+    def law_under(self, bound: FloatArray) -> tuple[Law, FloatArray]:
+        """(the law, the bounds of currents (rows, m) [A]) under bounds (rows, n): m is 0 where none is finite."""
+        if np.isfinite(bound).any():
+            return self.bounded.fresh(), np.ascontiguousarray(bound)
+        return self.law, np.zeros((len(bound), 0))
 
 
 def moved(numbers: Plant, plants: Sequence[Plant], step: float) -> Moved | None:
@@ -38,13 +56,39 @@ def moved(numbers: Plant, plants: Sequence[Plant], step: float) -> Moved | None:
     kinds = kind_of(everyone)
     if couples(numbers) or not is_coulomb(everyone).all() or (kinds != kinds[0]).any():
         return None
-    laws, drives = laws_of(everyone), drives_of(everyone)
-    change = (laws[1::2] - laws[2::2]).T / (2.0 * step)
-    memory = min(max(float(numbers.body.memory[0]), MEMORY_BOUNDS[0]), MEMORY_BOUNDS[1])
-    law = Law(laws[0].copy(), np.ascontiguousarray(change), int(kinds[0]), memory)
-    rims = rims_of(everyone)
-    drive_change, rim_change = (drives[1::2] - drives[2::2]) / (2.0 * step), (rims[1::2] - rims[2::2]) / (2.0 * step)
-    return Moved(law, drives[0], drive_change, rims[0], rim_change)
+    laws, drives, rims, wheels = laws_of(everyone), drives_of(everyone), rims_of(everyone), wheels_of(everyone)
+    bare = laws_of(everyone, emf=False)[:, DAMPING:TURNING]
+    limits = everyone.element["limit"][:, N_AXES:]
+    limit_change = np.where(np.isfinite(limits[1::2]), _change(np.where(np.isfinite(limits), limits, 0.0), step), 0.0)
+
+    def law(wheels: FloatArray, limit_change: FloatArray) -> Law:
+        return Law(
+            laws[0].copy(),
+            np.ascontiguousarray(_change(laws, step).T),
+            int(kinds[0]),
+            np.clip(numbers.body.memory, *MEMORY_BOUNDS),
+            wheels[0].copy(),
+            _change(wheels, step),
+            limit_change,
+            np.zeros(wheels.shape[1]),
+            bare[0].copy(),
+            np.ascontiguousarray(_change(bare, step).T),
+        )
+
+    return Moved(
+        law(wheels[:, :0], limit_change[:, :0]),
+        drives[0],
+        _change(drives, step),
+        rims[0],
+        _change(rims, step),
+        limits[0].copy(),
+        law(wheels, limit_change),
+    )
+
+
+def _change(numbers: FloatArray, step: float) -> FloatArray:
+    """Derivatives of numbers: of the robot, then up and down each of R directions. Shape (R, ...)."""
+    return np.ascontiguousarray((numbers[1::2] - numbers[2::2]) / (2.0 * step))
 
 
 def run(
@@ -60,6 +104,7 @@ def run(
     push: FloatArray | None = None,
     rates: Sequence[Mapping[str, FloatArray | None]] = (),
     order: Sequence[int] = (),
+    bound: FloatArray | None = None,
 ) -> Seen:
     """A run from a twist under held voltages, seen at t - late, with its derivatives.
 
@@ -76,15 +121,19 @@ def run(
         push: wrench from outside over each row [N, N, N m], shape (rows, 3).
         rates: of each of the K directions the derivatives of voltage, push and twist, where there are any.
         order: the place of each of them in what is seen.
+        bound: of the current of each motor over each row [A], shape (rows, n); None for the limits of the robot.
 
     Raises InputError where motion is so fast beside its duration that no patience would do.
     """
-    drive, keys = robot.drive, len(rates)
-    force, dforce = np.zeros((len(dt), N_AXES)), np.zeros((len(dt), N_AXES, keys))
-    for w in range(drive.shape[1]):  # in this order: what mirrors cancels to the last bit
+    drive, keys, rows = robot.drive, len(rates), len(dt)
+    law, bound = robot.law_under(np.broadcast_to(robot.limit, voltage.shape) if bound is None else bound)
+    limited = bound.shape[1] > 0
+    force, dforce = np.zeros((rows, N_AXES)), np.zeros((rows, N_AXES, keys))
+    dvolts = np.zeros((rows, bound.shape[1], keys))
+    for w in range(0 if limited else drive.shape[1]):  # in this order: what mirrors cancels to the last bit
         force += voltage[:, w, None] * drive[:, w]
     changes = robot.drive_change
-    if len(changes):
+    if len(changes) and not limited:
         dforce[:, :, : len(changes)] = (
             (voltage @ changes.reshape(-1, drive.shape[1]).T).reshape(len(dt), len(changes), N_AXES).swapaxes(1, 2)
         )
@@ -93,16 +142,19 @@ def run(
     dtwist = np.zeros((N_AXES, keys))
     for k, rate in enumerate(rates):
         dvoltage, dpush, start = rate.get("voltage"), rate.get("push"), rate.get("twist")
-        if dvoltage is not None:
+        if dvoltage is not None and limited:
+            dvolts[:, :, k] = dvoltage
+        elif dvoltage is not None:
             dforce[:, :, k] += dvoltage @ drive.T
         if dpush is not None:
             dforce[:, :, k] += dpush[: len(dt)]
         if start is not None:
             dtwist[:, k] = start
     seen = empty_seen(t, late, min(SAME_TIME, SAME_SHARE * float(dt.min())), np.asarray(order, np.int64), len(way))
-    rows = Rows(np.ascontiguousarray(dt), np.ascontiguousarray(force), dforce)
+    volts = np.ascontiguousarray(voltage[:, : bound.shape[1]])
+    held = Rows(np.ascontiguousarray(dt), np.ascontiguousarray(force), dforce, volts, dvolts, bound)
     limit = _most_steps(dt, tol)
-    _refuse_run_away(run_rows(robot.law, rows, new_work(twist, way, dtwist), step, tol, limit, seen), dt, tol, limit)
+    _refuse_run_away(run_rows(law, held, new_work(twist, way, dtwist), step, tol, limit, seen), dt, tol, limit)
     return seen
 
 
@@ -147,6 +199,7 @@ def run_looped(
     """
     keys, n = len(dgains), gains.shape[1]
     seen = empty_seen(t, late, SAME_TIME, np.arange(keys), len(way))
+    law, bound = robot.law_under(robot.limit[None])
     whole = Loop(
         gains,
         dgains,
@@ -158,6 +211,7 @@ def run_looped(
         np.zeros((0, 0, n)) if dcommand is None else np.ascontiguousarray(dcommand),
         loop.tick,
         np.zeros(N_AXES) if push is None else np.array(push, dtype=float),
+        bound[0],
         loop.period,
         loop.dead,
         loop.sum.copy(),
@@ -167,7 +221,7 @@ def run_looped(
     )
     work, limit = new_work(twist, way, np.zeros((N_AXES, keys))), _most_steps(dt, tol)
     dt = np.ascontiguousarray(dt)
-    row = run_loop(robot.law, dt, whole, before, np.zeros((keys, n)), work, step, tol, limit, seen)
+    row = run_loop(law, dt, whole, before, np.zeros((keys, n)), work, step, tol, limit, seen)
     _refuse_run_away(row, dt, tol, limit)
     return Looped(seen, whole.ask, whole.dask, whole.sum)
 

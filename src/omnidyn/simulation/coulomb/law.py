@@ -15,18 +15,20 @@ from omnidyn.model.layout import N_AXES, Plant
 
 MASS, DAMPING, TURNING, FORWARD, BACKWARD, TRAVEL = 0, 9, 18, 19, 22, 25  # places in a law
 SIZE = 27
+EMF, PUSH, THRUST = 3, 4, 5  # places in a wheel, behind its rim: per m/s, per volt, per ampere [N s/m, N/V, N/A]
+WHEEL = 6
 ROUNDING = 1e-12  # of the axes that it couples, a number that is not there
 BOX, ELLIPSE, PLAIN = 0, 1, 2  # where friction acts in the plane: per axis, along the direction of travel
 
 
 def is_coulomb(plants: Plant) -> BoolArray:
     """Whether this room knows robots, apart from `couples`: constant levels that hold no more than they slide with,
-    currents that settle at once and meet no limit. Shape (*batch,), as of the plants."""
+    currents that settle at once. Shape (*batch,), as of the plants."""
     body, element = plants
     motors, axes = element[..., N_AXES:], element[..., :N_AXES]
     stays = (body["laws"] == 0.0) & (body["bristles"] == 0.0) & (body["gathers"] == 0.0) & (body["off"] == 0.0)
     settles = (motors["inductance"] == 0.0) & (motors["drop"] == 0.0) & (motors["efficiency"] == 1.0)
-    free = (motors["active"] == 0.0) & (motors["breakaway"] == 0.0).all(axis=-1) & np.isinf(motors["limit"])
+    free = (motors["active"] == 0.0) & (motors["breakaway"] == 0.0).all(axis=-1)
     one_level = (axes["breakaway"] == axes["coulomb"]).all(axis=(-2, -1))
     one_level &= (body["breakaway"] == body["coulomb"]).all(axis=-1)
     both = (body["active"] != 0.0) & (axes["breakaway"][..., :2, :] > 0.0).any(axis=(-2, -1))
@@ -44,14 +46,14 @@ def kind_of(plants: Plant) -> IntArray:
     return np.where(body["active"] == 0.0, BOX, np.where(body["plain"] != 0.0, PLAIN, ELLIPSE))
 
 
-def laws_of(plants: Plant) -> FloatArray:
-    """The numbers of robots, M and D by rows; yaw in rad/s. Shape (*batch, SIZE)."""
+def laws_of(plants: Plant, emf: bool = True) -> FloatArray:
+    """The numbers of robots, M and D by rows; yaw in rad/s. emf: whether D has that of the motors. (*batch, SIZE)."""
     body, element = plants
     units = np.ones((*body.shape, N_AXES))
     units[..., 2] = body["length"]
     motors, g = element[..., N_AXES:], element["g"]
     damping = element["viscous"].copy()
-    damping[..., N_AXES:] += motors["thrust"] * motors["emf"] / motors["resistance"]
+    damping[..., N_AXES:] += emf * motors["thrust"] * motors["emf"] / motors["resistance"]
     square = units[..., :, None] * units[..., None, :]
     damped = np.zeros((*body.shape, N_AXES, N_AXES))
     for e in range(element.shape[-1]):  # in this order: what mirrors cancels to the last bit
@@ -78,6 +80,14 @@ def rims_of(plants: Plant) -> FloatArray:
     rims = plants.element["g"][..., N_AXES:, :].copy()
     rims[..., 2] *= plants.body["length"][..., None]
     return rims
+
+
+def wheels_of(plants: Plant) -> FloatArray:
+    """What each wheel does, see WHEEL. Shape (*batch, wheels, WHEEL)."""
+    motors = plants.element[..., N_AXES:]
+    push = motors["thrust"] / motors["resistance"]
+    numbers = np.stack([push * motors["emf"], push, motors["thrust"]], axis=-1)
+    return np.concatenate([rims_of(plants), numbers], axis=-1)
 
 
 def drives_of(plants: Plant) -> FloatArray:

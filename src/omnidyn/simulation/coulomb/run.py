@@ -2,6 +2,8 @@
 
 A step in which something stops, reverses or is released is cut until it is short, and then one implicit Euler stage.
 Under voltages that are given, or behind the firmware's speed loop.
+
+Where motors have limits, what a row holds are voltages; else forces. See limits.py.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ import numpy as np
 
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.simulation.coulomb.events import astray, happens
+from omnidyn.simulation.coulomb.limits import led_astray, put_in_force
 from omnidyn.simulation.coulomb.sampling import move_on, take_samples
 from omnidyn.simulation.coulomb.state import copy, copy_table
 from omnidyn.simulation.coulomb.step import GAMMA, derive_step, end_rate, short_step, solve_step, step_error
@@ -19,12 +22,15 @@ from omnidyn.simulation.speed_loop import passed, tick_answer, tick_branch
 
 SHORT_STEP = 1.5e-4  # [s] no step is given less than the share of tol of one so long
 SHORTEST_STEP = 1e-11  # [s]
+# A motor that changes, see limits.py: so late in a step, or of so little matter, that it is left; a cut just beyond it,
+# and the shortest.
+NEARLY, NO_MATTER, BEYOND, LEAST_SHARE = 0.95, 1e-3, 1.02, 0.02
 EVENTS_IN_A_ROW = 50  # so many, and what may go astray in each doubles with every EVENTS_MORE
 EVENTS_MORE = 10
 
 
 @part
-def _find(law, work, force, h, remaining, allowed, tol, most):
+def _find(law, work, force, volts, bound, h, remaining, allowed, most):
     """Find a step that is good enough, trying h first. Returns (its length, the next one, whether it is an event, steps
     solved). most: [m/s] by which an event may lead astray."""
     count = 0
@@ -35,6 +41,10 @@ def _find(law, work, force, h, remaining, allowed, tol, most):
         count += 1
         ratio = step_error(work) / (allowed * max(length, SHORT_STEP))
         event = happens(work.x, work.ends, force, law.value, law.kind)
+        off, share = led_astray(law, work.x, work.ends, volts, bound, length)
+        if off > (most if share > NEARLY else NO_MATTER * most) and length > SHORTEST_STEP:
+            h = max(SHORTEST_STEP, length * min(0.9, max(LEAST_SHARE, BEYOND * share)))
+            continue
         if event and astray(work.x, force, law.value, law.kind, length) > most and length > SHORTEST_STEP:
             h = max(SHORTEST_STEP, 0.125 * length)
             continue
@@ -47,14 +57,18 @@ def _find(law, work, force, h, remaining, allowed, tol, most):
 
 
 @part
-def _row(seen, law, work, force, dforce, begin, dt, h, tol, limit):
-    """A row of held force that begins at `begin` [s], trying steps of h first. Returns (the next h, steps solved): more
-    than limit where it was given up."""
+def _row(seen, law, work, outside, doutside, volts, dvolts, bound, begin, dt, h, tol, limit):
+    """A row of held forces and voltages that begins at `begin` [s], trying steps of h first. Returns (the next h, steps
+    solved): more than limit where it was given up."""
     remaining, now, events, steps, knows = dt, begin, 0, 0, False
-    allowed = tol / law.memory
+    allowed, limited = tol / law.memory[0], len(law.wheel) > 0
+    force, dforce = (work.force, work.dforce) if limited else (outside, doutside)
     while remaining > 0.0 and steps <= limit:
+        if limited:
+            put_in_force(law, work.x, volts, dvolts, bound, outside, doutside, force, dforce)
+            allowed = tol / law.memory[1 if law.side.any() else 0]
         most = tol * 2.0 ** max(0, (events - EVENTS_IN_A_ROW) // EVENTS_MORE)
-        length, h, event, count = _find(law, work, force, h, remaining, allowed, tol, most)
+        length, h, event, count = _find(law, work, force, volts, bound, h, remaining, allowed, most)
         steps += count
         share = length if event else GAMMA * length
         if event:
@@ -65,7 +79,7 @@ def _row(seen, law, work, force, dforce, begin, dt, h, tol, limit):
         end_rate(work, share)
         move_on(work, length, event)
         known = take_samples(seen, law, work, force, dforce, now, length, share, event, knows)
-        knows = known and not event
+        knows = known and not event and not limited
         copy(work.x, work.ends[2])
         copy(work.rate[0], work.rate[1])
         copy(work.way[0], work.way[1])
@@ -88,7 +102,19 @@ def run_rows(law, rows, work, step, tol, step_limit, seen):
     begin, steps = 0.0, 0
     for r in range(len(rows.dt)):
         step[0], count = _row(
-            seen, law, work, rows.force[r], rows.dforce[r], begin, rows.dt[r], step[0], tol, step_limit - steps
+            seen,
+            law,
+            work,
+            rows.force[r],
+            rows.dforce[r],
+            rows.volts[r],
+            rows.dvolts[r],
+            rows.bound[r],
+            begin,
+            rows.dt[r],
+            step[0],
+            tol,
+            step_limit - steps,
         )
         begin += rows.dt[r]
         steps += count
@@ -122,21 +148,29 @@ def _tick(loop, x, d, j, volts, dvolts):
 
 
 @part
-def _force_of_loop(loop, j, force, dforce):
-    """The force of the voltages of row j behind the driver, and its derivatives (3, K)."""
+def _behind_the_driver(loop, j, volts, dvolts):
+    """The voltages of row j as the driver passes them on (n,), and their derivatives (n, K)."""
+    for w in range(loop.ask.shape[1]):
+        volts[w] = passed(loop.ask[j, w], loop.dead)
+        flows = loop.dead == 0.0 or volts[w] != 0.0
+        for k in range(dvolts.shape[1]):
+            dvolts[w, k] = loop.dask[k, j, w] if flows else 0.0
+
+
+@part
+def _add_force(loop, volts, dvolts, force, dforce):
+    """The force of voltages and that from outside, with derivatives (3, K)."""
     for a in range(3):
         force[a] = loop.push[a]
         for k in range(dforce.shape[1]):
             dforce[a, k] = 0.0
-    for w in range(loop.ask.shape[1]):
-        volts = passed(loop.ask[j, w], loop.dead)
-        flows = loop.dead == 0.0 or volts != 0.0
+    for w in range(len(volts)):
         for a in range(3):
-            force[a] += loop.drive[a, w] * volts
+            force[a] += loop.drive[a, w] * volts[w]
             for k in range(len(loop.ddrive)):
-                dforce[a, k] += loop.ddrive[k, a, w] * volts
-            for k in range(dforce.shape[1] if flows else 0):
-                dforce[a, k] += loop.drive[a, w] * loop.dask[k, j, w]
+                dforce[a, k] += loop.ddrive[k, a, w] * volts[w]
+            for k in range(dforce.shape[1]):
+                dforce[a, k] += loop.drive[a, w] * dvolts[w, k]
 
 
 @branching_kernel
@@ -145,14 +179,33 @@ def run_loop(law, dt, loop, before, dbefore, work, step, tol, step_limit, seen):
     run_rows."""
     begin, steps, force, dforce = 0.0, 0, np.zeros(3), np.zeros((3, work.d.shape[1]))
     volts, dvolts = before.copy(), dbefore.copy()
+    passed_volts, passed_rates = np.zeros(len(before)), np.zeros((len(before), work.d.shape[1]))
     for j in range(len(dt)):
         if loop.tick[j]:
             _tick(loop, work.x, work.d, j, volts, dvolts)
         copy(loop.ask[j], volts)
         for k in range(len(dvolts)):
             copy(loop.dask[k, j], dvolts[k])
-        _force_of_loop(loop, j, force, dforce)
-        step[0], count = _row(seen, law, work, force, dforce, begin, dt[j], step[0], tol, step_limit - steps)
+        _behind_the_driver(loop, j, passed_volts, passed_rates)
+        if len(law.wheel) > 0:
+            copy(force, loop.push)
+        else:
+            _add_force(loop, passed_volts, passed_rates, force, dforce)
+        step[0], count = _row(
+            seen,
+            law,
+            work,
+            force,
+            dforce,
+            passed_volts,
+            passed_rates,
+            loop.bound,
+            begin,
+            dt[j],
+            step[0],
+            tol,
+            step_limit - steps,
+        )
         begin += dt[j]
         steps += count
         if steps > step_limit:

@@ -30,20 +30,37 @@ class Seen(NamedTuple):
 
 
 class Law(NamedTuple):
-    """The numbers of a robot, how they change with the first R of K parameters, and where friction acts: see law.py."""
+    """The numbers of a robot, how they change with the first R of K parameters, and where friction acts: see law.py.
+
+    Where a motor has a limit or coasts, m is the number of wheels, else 0; then value and change are as the motors are
+    at the moment, see limits.py.
+    """
 
     value: FloatArray  # (SIZE,)
     change: FloatArray  # (SIZE, R)
     kind: int
-    memory: float  # [s] in which the slowest motion fades
+    memory: FloatArray  # (2,) [s] in which the slowest motion fades; and where a motor is at its bound
+    wheel: FloatArray  # (m, WHEEL)
+    dwheel: FloatArray  # (R, m, WHEEL)
+    dlimit: FloatArray  # (R, m) change of the limit [A]
+    side: FloatArray  # (m,) 0: free, else the sign of the current at its bound
+    bare: FloatArray  # (9,) D without any motor
+    dbare: FloatArray  # (9, R)
+
+    def fresh(self) -> Law:
+        """The same with room of its own for what changes with the motors."""
+        return self._replace(value=self.value.copy(), change=self.change.copy(), side=self.side.copy())
 
 
 class Rows(NamedTuple):
-    """Forces held over rows [N, N, N m], and their derivatives."""
+    """Forces held over rows [N, N, N m], and their derivatives; with limits those that are not of the motors."""
 
     dt: FloatArray  # (rows,)
     force: FloatArray  # (rows, 3)
     dforce: FloatArray  # (rows, 3, K)
+    volts: FloatArray  # (rows, m)
+    dvolts: FloatArray  # (rows, m, K)
+    bound: FloatArray  # (rows, m) of currents [A]
 
 
 class Work(NamedTuple):
@@ -63,6 +80,8 @@ class Work(NamedTuple):
     drate: FloatArray  # (2, 3, K)
     dway: FloatArray  # (2, W, K)
     dspare: FloatArray  # (3, K)
+    force: FloatArray  # (3,) at work, where motors have limits
+    dforce: FloatArray  # (3, K)
 
 
 def empty_seen(t: FloatArray, late: FloatArray, same: float, order: IntArray, travel: int) -> Seen:
@@ -100,6 +119,8 @@ def new_work(start: FloatArray, way: FloatArray, dstart: FloatArray) -> Work:
         np.zeros((2, 3, keys)),
         np.zeros((2, travel, keys)),
         np.zeros((3, keys)),
+        np.zeros(3),
+        np.zeros((3, keys)),
     )
 
 
@@ -120,6 +141,7 @@ class Loop(NamedTuple):
     dcommand: FloatArray  # (K, J, n), or none
     tick: BoolArray  # (J,) whether the loop runs at the start of the row; else its voltage stays
     push: FloatArray  # (3,) wrench from outside
+    bound: FloatArray  # (n,) of currents [A]
     period: float  # [s]
     dead: float  # [V] of what the loop asks for the driver passes on all but this
     sum: FloatArray  # (n,) integral so far [V], in place

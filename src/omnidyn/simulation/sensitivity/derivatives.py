@@ -146,8 +146,7 @@ def differentiate(
     robot, keys, robots, numbers, plants = ready.robot, ready.keys, ready.robots, ready.numbers, ready.plants
     if held_commands.set_point is not None:
         refuse_rate(keys)
-    coasts = held_commands.open_circuit is not None
-    moved_robot = None if coasts or not tol else moved(numbers, plants, EPS)
+    moved_robot = moved(numbers, plants, EPS) if tol else None
     if moved_robot is not None:
         return _differentiate_coulomb(ready, moved_robot, held_commands, rates, start, tol)
     directions, length = directions_of(numbers, plants, rates), numbers.body.length
@@ -175,8 +174,7 @@ def differentiate(
         dcurrent = ds[..., N_AXES : N_AXES + numbers.wheels]
     else:
         dcurrent = _settled(robots, run, dtwist, dvolts)
-    dcurrent = dcurrent * (np.append(bound, bound[-1:], axis=0)[:, None] > 0.0)  # none while a motor coasts
-    parts = (np.moveaxis(part, 1, 2) / ready.scale for part in (dtwist, dposes, dcurrent))
+    parts = (np.moveaxis(part, 1, 2) / ready.scale for part in (dtwist, dposes, _flowing(dcurrent, bound)))
     return Derivatives(run, keys, *parts)
 
 
@@ -190,6 +188,7 @@ def _differentiate_coulomb(
 ) -> Derivatives:
     """`differentiate` of a robot under Coulomb friction."""
     robot, (twist, pose) = ready.robot, start
+    bound = current_bounds(robot, held_commands, len(held_commands.dt))
     edges = np.concatenate([[0.0], np.cumsum(held_commands.dt)])
     way, late = np.array([pose[2], 0.0, 0.0, pose[0], pose[1]]), np.zeros(1)
     if held_commands.set_point is None:
@@ -208,6 +207,7 @@ def _differentiate_coulomb(
             None,
             [{"voltage": rate} for rate in rates],
             range(len(rates)),
+            bound,
         )
     else:
         dt, command, tick, keep = on_ticks(robot, held_commands)
@@ -237,8 +237,13 @@ def _differentiate_coulomb(
     motion = Motion(None, twists, poses, voltage)
     run = as_run(robot, held_commands, held_commands, motion, named(Coulomb.kind, tol), ())
     dtwist, dpose = seen.dtwist[0], seen.dway[0][..., [PATH, PATH + 1, 0]]
-    parts = (dtwist, dpose, _settled(ready.robots, run, dtwist, dvolts))
+    parts = (dtwist, dpose, _flowing(_settled(ready.robots, run, dtwist, dvolts), bound))
     return Derivatives(run, ready.keys, *(np.moveaxis(part, 1, 2) / ready.scale for part in parts))
+
+
+def _flowing(dcurrent: FloatArray, bound: FloatArray) -> FloatArray:
+    """Derivatives of currents, none while a motor coasts."""
+    return dcurrent * (np.append(bound, bound[-1:], axis=0)[:, None] > 0.0)
 
 
 def _settled(robots: list[Robot], run: Run, dtwist: FloatArray, dvolts: FloatArray) -> FloatArray:
