@@ -223,14 +223,15 @@ def test_every_reason_is_named(axebot):
 @pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-8])
 @pytest.mark.parametrize("ratio", [1.0, 1.25])
 def test_an_option_that_never_acts_changes_nothing(axebot, ratio, tol):
-    """A current limit far above stall: the implicit engine finds the exact one's run within `tol`, rest included."""
+    """A current limit far above stall: other engines find the exact one's run within `tol`, rest included."""
     levels = axebot.friction.axes
     sticky = levels.replace(breakaway=tuple(ratio * c for c in levels.coulomb))
     robot = axebot.replace(friction=axebot.friction.replace(axes=sticky))
     limited = robot.replace(motor=robot.motor.replace(current_limit=100.0))
     voltage = table_3_voltages()[::10]
     exact, run = simulate(robot, voltage, 0.01), simulate(limited, voltage, 0.01, tol=tol)
-    assert run.source == f"simulated: axebot, implicit engine, tol {tol:g} m/s"
+    engine = "Coulomb" if ratio == 1.0 else "implicit"
+    assert run.source == f"simulated: axebot, {engine} engine, tol {tol:g} m/s"
     assert run.warnings == ()
     assert (np.abs(run.twist - exact.twist).max(axis=0) <= np.array([tol, tol, 10 * tol])).all()
     np.testing.assert_allclose(run.pose, exact.pose, atol=100 * tol)

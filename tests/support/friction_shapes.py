@@ -41,4 +41,4 @@ def shaped(shape, **motor):
 
 def implicit(robot):
     """The same robot, left to the general engine by brushes that drop next to nothing."""
-    return robot.replace(motor=robot.motor.replace(voltage_drop=1e-12))
+    return robot.replace(motor=robot.motor.replace(voltage_drop=1e-14))
