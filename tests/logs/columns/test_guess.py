@@ -539,3 +539,26 @@ def test_a_time_in_words_that_are_not_known_is_refused_with_a_cell(tmp_path, cel
     path.write_text("time,w1_rad_s\n" + "".join(f"{cells.format(k)},{k}\n" for k in range(ROWS)))
     with pytest.raises(InputError, match=r"time looks like t, but cells such as .*; write seconds, or dates such as"):
         read_log(path)
+
+
+def write_twins(tmp_path, second, name="w1_rad_s"):
+    rows = [f"{0.01 * k:g},{k},{second(k)}" for k in range(ROWS)]
+    path = tmp_path / "twins.csv"
+    path.write_text("\n".join([f"t_s,{name},{name}", *rows]) + "\n")
+    return path
+
+
+def test_two_columns_of_one_name_that_differ_are_asked_about(tmp_path):
+    path = write_twins(tmp_path, lambda k: k + 1)
+    words = r"two columns of one name; got w1_rad_s, 2 times.*`column` \"w1=w1_rad_s:rad/s\" or \"w1=w1_rad_s~2:rad/s\""
+    with pytest.raises(InputError, match=words):
+        read_log(path)
+    run = read_log(path, columns={"w1": "w1_rad_s~2:rad/s"})
+    np.testing.assert_array_equal(run.wheel_speed[:, 0], np.arange(ROWS) + 1.0)
+
+
+def test_two_columns_of_one_name_that_are_equal_or_of_no_channel_are_no_question(tmp_path):
+    np.testing.assert_array_equal(read_log(write_twins(tmp_path, lambda k: k)).wheel_speed[:, 0], np.arange(ROWS))
+    table = table_of(tmp_path, {"t_s": clock(0.01), "u1_V": 1.0})
+    assert set(guess_columns(table).columns) == {"t", "u1"}
+    assert set(guess_columns(read_table(write_twins(tmp_path, lambda k: -k, "humidity"))).columns) == {"t"}

@@ -129,7 +129,7 @@ class NameParts(NamedTuple):
 @lru_cache(4096)
 def read_name(name: str) -> NameParts:
     """The words of a column's name. A word that is not known counts as "other"."""
-    plain = _AGAIN.sub("", _without_accents(name[-MAX_NAME:].strip()))
+    plain = AGAIN.sub("", _without_accents(name[-MAX_NAME:].strip()))
     plain = re.sub(r"duty[ _-]?cycle", "duty", plain.replace("v_n", "vn"), flags=re.IGNORECASE)
     stem, unit = _without_unit(plain)
     stem = re.sub(r"(?<![A-Za-z])([FRBL]{2})(?=[A-Z][a-z])", r"\1 ", stem)  # FLPower
@@ -177,7 +177,7 @@ def _bare(part: str) -> str:
 
 
 BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\d\])][^\])]*)[\])]")  # a name and what looks like its unit, not joint[0]
-_AGAIN = re.compile(r"~\d+$")  # the second column of one name is called NAME~2
+AGAIN = re.compile(r"~\d+$")  # the second column of one name is called NAME~2
 _LAST = ("", "data", "value", "values")
 _SAYS_ITS_UNIT = ("rpm", "dps", "millis", "micros")  # a quantity and its unit in one word: rpm1, motor2Rpm, millis
 # In the middle of a name: a turn rate, a minimum, a section, what goes in.
