@@ -111,7 +111,8 @@ class NameParts(NamedTuple):
     """A name taken apart: roles of its words, the number of the wheel or None, the unit in it or None.
 
     before: what stands before the number, in small letters, without the unit; of a name with a place instead of a
-    number, all but the place. place: where its wheel stands [degree], see places.py.
+    number, all but the place. place: where its wheel stands [degree], see places.py. letter: of a name that is a small
+    letter and a number, but for its unit: d1, a2_deg.
     """
 
     roles: frozenset[str]
@@ -119,6 +120,7 @@ class NameParts(NamedTuple):
     unit: Unit | None
     before: str = ""
     place: float | None = None
+    letter: str = ""
 
     @property
     def of_one_wheel(self) -> bool:
@@ -143,7 +145,8 @@ def read_name(name: str) -> NameParts:
     place, words_left = place_in(words, _ROLE) if number is None else (None, words)
     if place is not None:
         roles, before = {role for word in words_left for role in _roles(word)}, " ".join(words_left)
-    return NameParts(frozenset(roles), number, unit, before, place)
+    letter = match[1] if (match := re.fullmatch(r"([a-z])\d{1,2}", stem)) else ""
+    return NameParts(frozenset(roles), number, unit, before, place, letter)
 
 
 def _without_accents(name: str) -> str:
