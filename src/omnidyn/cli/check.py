@@ -109,7 +109,13 @@ def _checked(
         checked.verdict = check_log(log, robot) if log is not None and only else check_blocks(blocks, robot)
         checked.log = log if picture else None
     except OmnidynError as error:
-        checked.error = error
+        doubt = getattr(error, "doubt", None)  # of an UnclearTimeError: a question about the log, as a finding
+        if doubt is None or not doubt.units:
+            checked.error = error
+        else:
+            from omnidyn.findings.check import undecided
+
+            checked.verdict = undecided(error)  # type: ignore[arg-type]
     checked.digest, checked.sha256, checked.notes = digest.value, digest.sha256, tuple(digest.notes)
     return checked
 

@@ -262,7 +262,7 @@ def test_counts_are_an_angle_once_their_counts_per_turn_are_said(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("step", "unit"), [(0.01, "s"), (10.0, "ms"), (0.002, "s"), (31.0, "ms"), (10_000.0, "us"), (1e7, "ns")]
+    ("step", "unit"), [(0.01, "s"), (11.0, "ms"), (0.002, "s"), (31.0, "ms"), (20_000.0, "us"), (2e7, "ns")]
 )
 def test_time_without_a_unit_is_taken_where_it_is_unmistakable(tmp_path, step, unit):
     columns = guess_columns(table_of(tmp_path, {"t": clock(step), "w1": 1.0}))
@@ -270,7 +270,10 @@ def test_time_without_a_unit_is_taken_where_it_is_unmistakable(tmp_path, step, u
     assert any("taken as " + unit in note for note in said(columns.notes))
 
 
-@pytest.mark.parametrize(("step", "units"), [(0.5, ("s", "ms")), (500.0, ("ms", "us")), (5e5, ("us", "ns"))])
+@pytest.mark.parametrize(
+    ("step", "units"),
+    [(0.5, ("s", "ms")), (2.0, ("s", "ms")), (500.0, ("ms", "us")), (1100.0, ("ms", "us")), (5e5, ("us", "ns"))],
+)
 def test_time_that_may_be_two_units_is_not_taken(tmp_path, step, units):
     columns = guess_columns(table_of(tmp_path, {"t": clock(step), "w1": 1.0}))
     assert "t" not in columns.columns

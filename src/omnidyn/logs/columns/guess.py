@@ -381,12 +381,23 @@ def _take_single(table: Table, name: str, component: str, assumed: Mapping[str, 
         _enter(table, name, component, unit, is_declared, guess)
 
 
-def refuse_doubtful(columns: ColumnMap, where: str) -> None:
+class UnclearTimeError(InputError):
+    """Nothing tells the time of the rows. doubt: about the column that looks like it; rows: of the table."""
+
+    doubt: Doubt
+    rows: int
+
+
+def refuse_doubtful(columns: ColumnMap, table: Table) -> None:
     """Raises InputError where nothing tells the time: without it there is no log."""
-    if TIME not in columns.columns:
-        unclear = next((doubt for doubt in columns.doubts if TIME in doubt.components), None)
-        reason, remedy = "no column looks like a time", TIME_REMEDY
-        if unclear is not None:
-            reason = shortened(str(Statement("time_unclear", ERROR, TIME, {"doubt": unclear})), 300)
-            remedy = unclear.remedy_text if unclear.units else SECONDS_OR_DATES
-        raise InputError(f"cannot tell the time of the rows: {reason}", remedy=remedy, where=where)
+    if TIME in columns.columns:
+        return
+    unclear = next((doubt for doubt in columns.doubts if TIME in doubt.components), None)
+    what = "cannot tell the time of the rows"
+    if unclear is None:
+        raise InputError(f"{what}: no column looks like a time", remedy=TIME_REMEDY, where=table.source)
+    reason = shortened(str(Statement("time_unclear", ERROR, TIME, {"doubt": unclear})), 300)
+    remedy = unclear.remedy_text if unclear.units else SECONDS_OR_DATES
+    error = UnclearTimeError(f"{what}: {reason}", remedy=remedy, where=table.source)
+    error.doubt, error.rows = unclear, len(table)
+    raise error
