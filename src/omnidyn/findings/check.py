@@ -27,6 +27,7 @@ from omnidyn.findings.scale.scale import check_dead_wheels, check_scale, check_t
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.slip import check_axes, check_slip
 from omnidyn.findings.time_base import begin, between
+from omnidyn.findings.values.copies import check_copies
 from omnidyn.findings.values.values import check_echo, check_values
 from omnidyn.findings.wiring.twist_frame import check_twist_frame
 from omnidyn.findings.wiring.wheels import check_wiring
@@ -42,6 +43,7 @@ __all__ = ["check", "check_blocks", "check_log"]
 Family = Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 FAMILIES: tuple[Family, ...] = (
     check_echo,
+    check_copies,
     check_values,
     check_limits,
     check_twist_frame,
