@@ -15,6 +15,7 @@ from omnidyn.cli import (
     check,
     compare,
     demo,
+    doctor,
     exchange,
     identify,
     init,
@@ -113,6 +114,7 @@ for _command in (
     robots,
     exchange.export,
     warm.warm,
+    doctor.doctor,
     studio,
 ):
     app.command(cls=Grouped)(_command)
