@@ -9,7 +9,8 @@ import numpy
 import pytest
 
 import omnidyn
-from omnidyn.cli import doctor, main
+from omnidyn.cli import main
+from omnidyn.cli.installation import doctor
 
 
 def seen(capsys, *arguments):

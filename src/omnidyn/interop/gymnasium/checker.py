@@ -99,9 +99,10 @@ def _start(envs: Any, seed: int | None, mask: Any = None) -> Any:
     """The observation after a reset, copied."""
     options = None if mask is None else {"reset_mask": mask.copy()}
     given = envs.reset(seed=seed, options=options)
-    taken = options is not None and not np.array_equal(options.get("reset_mask"), mask)
-    if taken and not type(envs).__module__.startswith("gymnasium."):
-        got, expected = options.get("reset_mask", "no reset_mask in them"), "the options as they were given"
+    left = {} if options is None else options
+    kept = mask is None or ("reset_mask" in left and np.array_equal(left["reset_mask"], mask))
+    if not kept and not type(envs).__module__.startswith("gymnasium."):
+        got, expected = left.get("reset_mask", "no reset_mask in them"), "the options as they were given"
         raise _broken("a reset changes the options of its caller", got, expected, "read `reset_mask`, do not pop it")
     if not (isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], dict)):
         raise _broken("reset gives something else", type(given).__name__, "(observations, infos)")
