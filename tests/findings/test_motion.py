@@ -153,3 +153,43 @@ def test_an_input_that_outruns_the_rows(log, with_channels):
     assert finding.subject == "u1"
     assert finding.numbers["share"] == pytest.approx(0.5, abs=0.05)
     assert not check(log).of("too_fast")
+
+
+# Whether the robot moves at all, behind noise and beside columns that were guessed
+
+
+def slow_motion(noise, speed=12.0, rate=1000.0, seconds=8.0, seed=0, **more):
+    rng, n = np.random.default_rng(seed), round(rate * seconds)
+    t = np.arange(n) / rate
+    turning = np.where((t > 2.0) & (t < 5.0), speed, 0.0)
+    channels = {"wheel_speed": turning[:, None] + noise * rng.normal(size=(n, 1)), "duty": 0.3 * (turning > 0)[:, None]}
+    return Log(t, channels | {name: values(t) for name, values in more.items()}, np.arange(n) + 2)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_motion_behind_noise_is_one(seed):
+    """65 rad/s of noise around 12: plain in a mean over 1.5 s."""
+    assert not check(slow_motion(65.0, seed=seed)).of("never_moved")
+    assert not check(slow_motion(65.0, -12.0, seed=seed)).of("never_moved")
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("noise", [0.5, 65.0])
+def test_noise_alone_is_no_motion(noise, seed):
+    assert check(slow_motion(noise, 0.0, seed=seed)).of("never_moved")
+
+
+def test_an_encoder_that_flickers_between_two_counts_is_at_rest():
+    rng, n = np.random.default_rng(0), 4000
+    flicker = np.diff(rng.integers(0, 2, n + 1)) * 40.0
+    assert check(Log(np.arange(n) * 1e-3, {"wheel_speed": flicker[:, None]}, np.arange(n) + 2)).of("never_moved")
+
+
+def test_a_pose_that_moves_is_a_robot_that_moves():
+    """A force of 0 to 5 N that was guessed as the angle of a wheel hardly turns it."""
+    log = slow_motion(0.5, 0.0, pose=lambda t: np.column_stack([0.2 * t, np.sin(t), 0.0 * t]))
+    assert not check(log).of("never_moved")
+    resting = slow_motion(
+        0.5, 0.0, pose=lambda t: 0.002 * np.random.default_rng(0).normal(size=(len(t), 3)) + [1.0, 2.0, 0.5]
+    )
+    assert check(resting).of("never_moved")

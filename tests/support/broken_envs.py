@@ -29,9 +29,11 @@ FAULTS = {
     "none_reset": "does nothing",
     "shared_random": "way of others",
     "leak": "remembers",
+    "pops": "changes the options of its caller",
 }
 MODES = {"next": AutoresetMode.NEXT_STEP, "same": AutoresetMode.SAME_STEP}
-MODES |= dict.fromkeys(("all", "none", "shared", "leak"), AutoresetMode.DISABLED)
+PARTIAL = ("all_reset", "none_reset", "shared_random", "leak", "pops")  # faults of partial resets, in any mode
+MODES |= dict.fromkeys((fault.split("_")[0] for fault in PARTIAL), AutoresetMode.DISABLED)
 
 
 class Walk(VectorEnv):
@@ -59,6 +61,8 @@ class Walk(VectorEnv):
 
     def reset(self, *, seed=None, options=None):
         who = np.ones(self.num_envs, bool) if not options else options["reset_mask"]
+        if self.fault == "pops" and options:
+            del options["reset_mask"]
         if self.fault == "all_reset":
             who = np.ones(self.num_envs, bool)
         if seed is not None:

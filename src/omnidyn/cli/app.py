@@ -22,8 +22,8 @@ from omnidyn.cli import (
     loops,
     simulate,
     sweep,
-    warm,
 )
+from omnidyn.cli.installation import doctor, warm
 from omnidyn.cli.terminal.help import Grouped
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import show
@@ -113,6 +113,7 @@ for _command in (
     robots,
     exchange.export,
     warm.warm,
+    doctor.doctor,
     studio,
 ):
     app.command(cls=Grouped)(_command)

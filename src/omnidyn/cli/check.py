@@ -106,12 +106,17 @@ def _checked(
         log, only, blocks = _first(digest.through(iter_logs(path, robot, options, rows=BLOCK, progress=listen)))
         if log is not None:
             maps.show(path, log.columns, doubts=False)
-            checked.notes = log.notes
         checked.verdict = check_log(log, robot) if log is not None and only else check_blocks(blocks, robot)
         checked.log = log if picture else None
     except OmnidynError as error:
-        checked.error = error
-    checked.digest, checked.sha256 = digest.value, digest.sha256
+        doubt = getattr(error, "doubt", None)  # of an UnclearTimeError: a question about the log, as a finding
+        if doubt is None or not doubt.units:
+            checked.error = error
+        else:
+            from omnidyn.findings.check import undecided
+
+            checked.verdict = undecided(error)  # type: ignore[arg-type]
+    checked.digest, checked.sha256, checked.notes = digest.value, digest.sha256, tuple(digest.notes)
     return checked
 
 
@@ -132,12 +137,13 @@ def _first(blocks: Iterator[Log]) -> tuple[Log | None, bool, Iterator[Log]]:
 
 
 class _Digest:
-    """What the numbers of a log hash to, whatever its name and format."""
+    """What the numbers of a log hash to, whatever its name and format, and what was said of its blocks, once each."""
 
     def __init__(self) -> None:
         import hashlib
 
         self.hash, self.sha256 = hashlib.sha256(), ""
+        self.notes: dict[Statement, None] = {}
 
     @property
     def value(self) -> str:
@@ -150,6 +156,7 @@ class _Digest:
             for name, values in sorted(block.channels.items()):
                 self.hash.update(name.encode() + values.tobytes())
             self.sha256 = block.sha256 or self.sha256
+            self.notes |= dict.fromkeys(block.notes)
             yield block
 
 

@@ -16,9 +16,9 @@ from omnidyn.arguments import check_order
 from omnidyn.findings.energy import check_energy
 from omnidyn.findings.excitation import check_excitation, joined, judge
 from omnidyn.findings.filters import check_averaged, check_filters
-from omnidyn.findings.finding import Finding, Verdict, in_order, merged, with_guesses
+from omnidyn.findings.finding import Finding, Use, Verdict, in_order, merged, with_guesses
 from omnidyn.findings.finding import joined as joined_uses
-from omnidyn.findings.fitness import uses
+from omnidyn.findings.fitness import USES, uses
 from omnidyn.findings.limits import check_limits
 from omnidyn.findings.motion import check_motion, check_oddities
 from omnidyn.findings.scale.derivatives import check_derivatives
@@ -27,19 +27,23 @@ from omnidyn.findings.scale.scale import check_dead_wheels, check_scale, check_t
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.slip import check_axes, check_slip
 from omnidyn.findings.time_base import begin, between
+from omnidyn.findings.values.copies import check_copies
 from omnidyn.findings.values.values import check_echo, check_values
 from omnidyn.findings.wiring.twist_frame import check_twist_frame
 from omnidyn.findings.wiring.wheels import check_wiring
+from omnidyn.logs.channels import TIME
+from omnidyn.logs.columns.guess import UnclearTimeError
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_run
-from omnidyn.statement import ERROR, NOTE
+from omnidyn.statement import ERROR, NOTE, Statement
 
 __all__ = ["check", "check_blocks", "check_log"]
 
 Family = Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 FAMILIES: tuple[Family, ...] = (
     check_echo,
+    check_copies,
     check_values,
     check_limits,
     check_twist_frame,
@@ -106,6 +110,15 @@ def check_log(log: Log, robot: Robot | None = None) -> Verdict:
         tuple(name for name in log.channels if work_has(log, name)),
         log.source,
         log_uses,
+    )
+
+
+def undecided(error: UnclearTimeError) -> Verdict:
+    """The verdict on a log whose time may be in two units, or in one that nobody knows: that is asked, first of all."""
+    reason = Statement("refused", ERROR, "", {"what": error.what, "remedy": ""})
+    finding = Finding(DOUBT, ERROR, TIME, {"doubt": error.doubt})
+    return Verdict(
+        (finding,), rows=error.rows, source=error.where, uses=tuple(Use(name, False, reason) for name in USES)
     )
 
 

@@ -19,6 +19,10 @@ SETTLE, HOLD_TIME = 0.4, 0.3  # [s]
 DROOP = 0.05
 NOISE_QUANTILE = 0.99  # of noise at rest: a row in some thousands is beyond its level,
 NOISE_FACTOR = 1.5  # none beyond so many times that
+LONGER = 2  # times the window before, each window over which something may move
+SURE = 4.5  # standard errors of a mean over such a window, of which there are some hundreds
+REST_SPEED = 0.05  # [rad/s, m/s] that a mean over a long window may have at rest: an offset of a sensor
+REST_WAY = 0.05  # [m, rad] by which a pose may wander at rest
 MOMENT = 0.15  # [s]
 SAFETY = 1.6  # a robot that stands although its voltages are so many times those that move it was held
 
@@ -30,7 +34,7 @@ def check_motion(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     still = _still(work)
     if still is None:
         return [], work
-    if still.mean() > NOISE_QUANTILE and np.all(_still(work, NOISE_FACTOR)):
+    if still.mean() > NOISE_QUANTILE and np.all(_still(work, NOISE_FACTOR)) and not _moves_anywhere(work):
         return [_never_moved(work)], work.knowing(at_rest=True)
     return _start_up(work, still) + _blocked(work, still) + _droop(work), work
 
@@ -71,6 +75,28 @@ def _still(work: LogUnderCheck, times: float = 1.0) -> BoolArray | None:
             with np.errstate(invalid="ignore"):
                 still &= ~(np.abs(smooth(column, width)) > times * _rest_level(column, width))
     return still
+
+
+def _moves_anywhere(work: LogUnderCheck) -> bool:
+    """Whether any channel moves over any window that its noise allows: a speed in the mean, a pose by its way."""
+    narrow = work.width(0.1)
+    for channel in ("wheel_speed", "twist"):
+        for component, column in work.columns(channel):
+            if component == "omega":  # a gyroscope has an offset
+                continue
+            noise, count, width = white_noise(column), 1.01 * quantum(column) * narrow, narrow * LONGER
+            while width <= len(column):
+                level = max(SURE * noise / np.sqrt(width), count / width, REST_SPEED)
+                whole = slice(width // 2, len(column) - (width - 1) // 2)  # windows at the ends are shorter
+                if np.nanmax(np.abs(smooth(column, width)[whole]), initial=0.0) > level:
+                    return True
+                width *= LONGER
+    for _, column in work.columns("pose"):
+        means = smooth(column[np.isfinite(column)], work.width(0.5))
+        level = max(12.0 * white_noise(column), 3.0 * quantum(column), REST_WAY)
+        if len(means) and np.ptp(means) > level:
+            return True
+    return False
 
 
 def _rest_level(column: FloatArray, width: int) -> float:

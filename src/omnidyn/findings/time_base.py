@@ -175,7 +175,7 @@ def between(last: tuple[float, int] | None, block: Log, rate: float) -> tuple[li
         return [], row_end
     first, line = float(block.t[timed[0]]), int(block.lines[timed[0]])
     step = first - last[0]
-    pair = Log(np.array([last[0], first]), {}, np.array([last[1], line]), source=block.source)
+    pair = Log(np.array([last[0], first]), {}, np.array([last[1], line]), source=block.source, restarts=block.restarts)
     if step < 0.0:
         return _backward(pair, np.arange(2)), row_end
     if step == 0.0:

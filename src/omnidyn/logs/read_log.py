@@ -187,7 +187,7 @@ def map_columns(table: Table, robot: Robot | None, options: LogOptions) -> Colum
                 remedy=remedy,
                 where=table.source,
             )
-    refuse_doubtful(columns, table.source)
+    refuse_doubtful(columns, table)
     return columns
 
 

@@ -6,7 +6,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from omnidyn.errors import InputError
 from omnidyn.interop.gymnasium import check_vector_env
-from tests.support.broken_envs import FAULTS, MODES, Walk
+from tests.support.broken_envs import FAULTS, MODES, PARTIAL, Walk
 
 
 @pytest.mark.parametrize("mode", list(AutoresetMode))
@@ -17,6 +17,13 @@ def test_a_clean_one_passes(mode):
 @pytest.mark.parametrize("fault", FAULTS)
 def test_each_broken_promise_is_found(fault):
     mode = MODES.get(fault.split("_")[0], AutoresetMode.NEXT_STEP)
+    with pytest.raises(InputError, match=FAULTS[fault]):
+        check_vector_env(Walk(fault, mode))
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize("fault", PARTIAL)
+def test_a_broken_partial_reset_is_found_in_every_mode(fault, mode):
     with pytest.raises(InputError, match=FAULTS[fault]):
         check_vector_env(Walk(fault, mode))
 

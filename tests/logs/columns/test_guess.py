@@ -262,7 +262,7 @@ def test_counts_are_an_angle_once_their_counts_per_turn_are_said(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("step", "unit"), [(0.01, "s"), (10.0, "ms"), (0.002, "s"), (31.0, "ms"), (10_000.0, "us"), (1e7, "ns")]
+    ("step", "unit"), [(0.01, "s"), (11.0, "ms"), (0.002, "s"), (31.0, "ms"), (20_000.0, "us"), (2e7, "ns")]
 )
 def test_time_without_a_unit_is_taken_where_it_is_unmistakable(tmp_path, step, unit):
     columns = guess_columns(table_of(tmp_path, {"t": clock(step), "w1": 1.0}))
@@ -270,7 +270,10 @@ def test_time_without_a_unit_is_taken_where_it_is_unmistakable(tmp_path, step, u
     assert any("taken as " + unit in note for note in said(columns.notes))
 
 
-@pytest.mark.parametrize(("step", "units"), [(0.5, ("s", "ms")), (500.0, ("ms", "us")), (5e5, ("us", "ns"))])
+@pytest.mark.parametrize(
+    ("step", "units"),
+    [(0.5, ("s", "ms")), (2.0, ("s", "ms")), (500.0, ("ms", "us")), (1100.0, ("ms", "us")), (5e5, ("us", "ns"))],
+)
 def test_time_that_may_be_two_units_is_not_taken(tmp_path, step, units):
     columns = guess_columns(table_of(tmp_path, {"t": clock(step), "w1": 1.0}))
     assert "t" not in columns.columns
@@ -539,3 +542,26 @@ def test_a_time_in_words_that_are_not_known_is_refused_with_a_cell(tmp_path, cel
     path.write_text("time,w1_rad_s\n" + "".join(f"{cells.format(k)},{k}\n" for k in range(ROWS)))
     with pytest.raises(InputError, match=r"time looks like t, but cells such as .*; write seconds, or dates such as"):
         read_log(path)
+
+
+def write_twins(tmp_path, second, name="w1_rad_s"):
+    rows = [f"{0.01 * k:g},{k},{second(k)}" for k in range(ROWS)]
+    path = tmp_path / "twins.csv"
+    path.write_text("\n".join([f"t_s,{name},{name}", *rows]) + "\n")
+    return path
+
+
+def test_two_columns_of_one_name_that_differ_are_asked_about(tmp_path):
+    path = write_twins(tmp_path, lambda k: k + 1)
+    words = r"two columns of one name; got w1_rad_s, 2 times.*`column` \"w1=w1_rad_s:rad/s\" or \"w1=w1_rad_s~2:rad/s\""
+    with pytest.raises(InputError, match=words):
+        read_log(path)
+    run = read_log(path, columns={"w1": "w1_rad_s~2:rad/s"})
+    np.testing.assert_array_equal(run.wheel_speed[:, 0], np.arange(ROWS) + 1.0)
+
+
+def test_two_columns_of_one_name_that_are_equal_or_of_no_channel_are_no_question(tmp_path):
+    np.testing.assert_array_equal(read_log(write_twins(tmp_path, lambda k: k)).wheel_speed[:, 0], np.arange(ROWS))
+    table = table_of(tmp_path, {"t_s": clock(0.01), "u1_V": 1.0})
+    assert set(guess_columns(table).columns) == {"t", "u1"}
+    assert set(guess_columns(read_table(write_twins(tmp_path, lambda k: -k, "humidity"))).columns) == {"t"}

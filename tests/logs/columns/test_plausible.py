@@ -106,6 +106,12 @@ def test_a_robot_says_what_its_supply_can_be():
     assert "supply" in guessed({"battery": 25.2}, axebot).columns
 
 
+def test_a_current_in_a_unit_that_is_given_is_for_check_where_a_robot_says_more():
+    assert "i1" not in guessed({"i1_A": 900.0 * SWING}).columns
+    assert "i1" in guessed({"i1_A": 900.0 * SWING}, load_robot("axebot")).columns
+    assert "i1" not in guessed({"i1": 900.0 * SWING}, load_robot("axebot")).columns
+
+
 def test_a_unit_that_a_user_says_is_believed():
     assert guessed({"battery": 7400.0}, assume={"supply": "V"}).columns["supply"].unit == "V"
     assert guessed({"vx": 500.0 * SWING}, assume={"vx": "m/s"}).columns["vx"].unit == "m/s"

@@ -1,9 +1,13 @@
 """Datasets of LeRobot: the speeds of a base out of action and observation.state."""
 
+import json
+
 import numpy as np
 import pytest
 
+import omnidyn.cli.check
 from omnidyn import check, load_log, load_robot, read_log
+from omnidyn.cli import main
 from omnidyn.errors import InputError
 from omnidyn.logs.segments import segments
 from tests.support.codes import said
@@ -93,3 +97,23 @@ def test_many_short_episodes_do_not_hide_an_echo(tmp_path, late):
     echoes = [np.concatenate([np.full((late, 3), 0.1), command[:-late]]).astype(np.float32) for command in commands]
     verdict = check(load_log(write_dataset(tmp_path / "set", list(zip(commands, echoes, strict=True)))))
     assert [finding.numbers["rows"] for finding in verdict.of("echo")] == [late]
+
+
+@pytest.mark.parametrize("block", [500_000, ROWS, 50])
+def test_a_file_for_each_episode_is_no_gap_to_the_command_line(tmp_path, monkeypatch, capsys, block):
+    """Datasets of version 2.1 have a file per episode; "299 rows lost" stood where version 3 named two episodes."""
+    monkeypatch.setattr(omnidyn.cli.check, "BLOCK", block)
+    root = write_dataset(tmp_path / "set", [lerobot_episode(seed) for seed in range(2)], files=2)
+    main(["check", str(root), "--json"])
+    shown = capsys.readouterr()
+    assert "2 episodes are recordings of their own" in shown.err
+    codes = {finding["code"] for finding in json.loads(shown.out)["logs"][0]["findings"]}
+    assert "gap" not in codes
+
+
+def test_a_dataset_without_names_or_with_one_twice_says_what_to_do(tmp_path):
+    with pytest.raises(InputError, match=r'got no names.*write what the numbers are into meta/info\.json: "names"'):
+        read_log(write_dataset(tmp_path / "a", [lerobot_episode()], None))
+    twice = ["x.vel", *NAMES[1:]]
+    with pytest.raises(InputError, match=r"one name; got x\.vel, 2 times in action.*correct its names in meta/info"):
+        read_log(write_dataset(tmp_path / "b", [lerobot_episode()], twice))

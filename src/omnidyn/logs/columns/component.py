@@ -29,6 +29,7 @@ _NUMBERED = (
 )
 _OF_A_RIM = {words.LINEAR, words.RATE, words.WHEEL, words.MOTOR, words.COMMAND, words.MEASURED}
 BY_UNIT = {VOLTAGE: "u", CURRENT: "i", DUTY: "d", TURN_RATE: "w", COUNT_RATE: "w", ANGLE: "a", COUNT: "a"}
+_OF_LETTERS = {"d": (DUTY,), "a": (ANGLE, COUNT)}  # d1, a1: no words, and what they are measured in
 _KIN = {"u": "ud", "d": "ud", "i": "i", "w": "wa", "a": "wa"}  # what a word may say beside a unit of the first
 _LOG_QUANTITIES = {*BY_UNIT, SPEED, LENGTH, TIME_UNIT}  # quantities of the channels of a log
 DRIVES = frozenset({words.VOLTAGE, words.DUTY, words.MOTOR, words.WHEEL, words.COMMAND})  # words of what drives a motor
@@ -50,6 +51,8 @@ def component_of(name: str, unit: Unit | None, wheel: int | None) -> str | None:
     wheel: the number of the wheel, from 1, that the number or the place in its name means.
     """
     exact, parts = exact_component(name), read_name(name)
+    if exact is None and (location := place(name)) is not None and location[0] == "force":
+        return name  # f1: no number of a wheel
     if exact is not None and wheel is not None and parts.number != wheel:
         exact = None  # a run file counts from 1, this one does not
     return exact or component_of_parts(parts, unit, wheel)
@@ -64,7 +67,7 @@ def is_other(name: NameParts) -> bool:
 def component_of_parts(name: NameParts, unit: Unit | None, wheel: int | None) -> str | None:
     """The component that the words of a name say, None where they say none or too many."""
     unit = unit or name.unit
-    if is_other(name) and not (name.of_one_wheel and unit):
+    if is_other(name) and not (name.of_one_wheel and unit) and not _documented_letter(name, unit):
         return None
     if unit is not None and unit.quantity not in _LOG_QUANTITIES:
         return None
@@ -88,6 +91,8 @@ def numbered_kind(name: NameParts, unit: Unit | None) -> str | None:
     if not name.of_one_wheel:
         return None
     unit, roles = unit or name.unit, name.roles
+    if letter := _documented_letter(name, unit):
+        return letter
     if unit is not None and unit.quantity not in _LOG_QUANTITIES:
         return None
     if unit is not None and unit.quantity == SPEED and words.LINEAR in roles and roles <= _OF_A_RIM:
@@ -103,6 +108,12 @@ def numbered_kind(name: NameParts, unit: Unit | None) -> str | None:
         if (set(letters) & set(kin)) if letters else no_word:
             letter = by_unit
     return None if letter in ("u", "d") and words.SENSOR in roles else letter
+
+
+def _documented_letter(name: NameParts, unit: Unit | None) -> str:
+    """ "d" of d1 and "a" of a1, which are no words but are documented, where the unit may be one of it; else ""."""
+    quantities = _OF_LETTERS.get(name.letter, ())
+    return name.letter if quantities and (unit is None or unit.quantity in quantities) else ""
 
 
 def _body_component(name: NameParts, unit: Unit | None, command: str) -> str | None:

@@ -8,6 +8,9 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, shortened
 from omnidyn.logs.channels import TIME, place, si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
@@ -24,7 +27,7 @@ from omnidyn.logs.columns.guess_time import take_time
 from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, settle_side, take_sides, unit_of, voltage_limit
 from omnidyn.logs.columns.guessed import Doubt, Guess, doubt, first_word, floats, is_numeric, joined_doubts, letter_of
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
-from omnidyn.logs.columns.names import BRACKETS, read_name
+from omnidyn.logs.columns.names import AGAIN, BRACKETS, read_name
 from omnidyn.logs.columns.plausible import beyond_range
 from omnidyn.logs.columns.wheel_numbers import BY_PLACES, proposed_wheels, wheel_numbers
 from omnidyn.logs.table.table import Table
@@ -82,6 +85,7 @@ def guess_columns(
     _ask_where_motion_differs(table, numbers, guess)
     settle_side(table, robot, guess)
     take_sides({name: side for name, (_, side) in declared.items() if side}, guess)
+    _refuse_twins(table, guess, taken or {})
     guess.doubts = [open_doubt for open_doubt in guess.doubts if open_doubt.columns[0] not in (taken or {})]
     used_names = {column.name for column in guess.columns.values()}
     unused = tuple(name for name in table.names if name not in used_names)
@@ -266,6 +270,34 @@ def _enter_rim(name: str, component: str, unit: Unit, guess: Guess) -> None:
     guess.note("speeds_of_rims", unit=unit.text)
 
 
+def _refuse_twins(table: Table, guess: Guess, taken: Mapping[str, str]) -> None:
+    """Raises InputError where two columns have one name and the first would be taken; equal ones are one.
+
+    taken: column -> component, where the user says which it is.
+    """
+    for component, column in guess.columns.items():
+        twins = [name for name in table.names if AGAIN.sub("", name) == column.name != name]
+        twins = [name for name in twins if not _are_equal(table.columns[name], table.columns[column.name])]
+        if not twins or component in taken.values():
+            continue
+        unit = f":{column.unit}" if column.unit else ""
+        choices = " or ".join(f'"{component}={name}{unit}"' for name in (column.name, *twins))
+        raise InputError(
+            "two columns of one name",
+            got=f"{column.name}, {1 + len(twins)} times; the later ones are called {', '.join(twins)}",
+            expected="a name for each column",
+            remedy=f"rename one, or say which it is: `column` {choices}",
+            where=table.source,
+        )
+
+
+def _are_equal(one: FloatArray | tuple[str, ...], other: FloatArray | tuple[str, ...]) -> bool:
+    """Whether two columns hold the same, to the last digit."""
+    if isinstance(one, tuple) or isinstance(other, tuple):
+        return isinstance(one, tuple) and one == other
+    return np.array_equal(one, other, equal_nan=True)
+
+
 def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], guess: Guess) -> None:
     """A log of one motor, whose columns need no number: voltage, current, velocity, position.
 
@@ -349,12 +381,23 @@ def _take_single(table: Table, name: str, component: str, assumed: Mapping[str, 
         _enter(table, name, component, unit, is_declared, guess)
 
 
-def refuse_doubtful(columns: ColumnMap, where: str) -> None:
+class UnclearTimeError(InputError):
+    """Nothing tells the time of the rows. doubt: about the column that looks like it; rows: of the table."""
+
+    doubt: Doubt
+    rows: int
+
+
+def refuse_doubtful(columns: ColumnMap, table: Table) -> None:
     """Raises InputError where nothing tells the time: without it there is no log."""
-    if TIME not in columns.columns:
-        unclear = next((doubt for doubt in columns.doubts if TIME in doubt.components), None)
-        reason, remedy = "no column looks like a time", TIME_REMEDY
-        if unclear is not None:
-            reason = shortened(str(Statement("time_unclear", ERROR, TIME, {"doubt": unclear})), 300)
-            remedy = unclear.remedy_text if unclear.units else SECONDS_OR_DATES
-        raise InputError(f"cannot tell the time of the rows: {reason}", remedy=remedy, where=where)
+    if TIME in columns.columns:
+        return
+    unclear = next((doubt for doubt in columns.doubts if TIME in doubt.components), None)
+    what = "cannot tell the time of the rows"
+    if unclear is None:
+        raise InputError(f"{what}: no column looks like a time", remedy=TIME_REMEDY, where=table.source)
+    reason = shortened(str(Statement("time_unclear", ERROR, TIME, {"doubt": unclear})), 300)
+    remedy = unclear.remedy_text if unclear.units else SECONDS_OR_DATES
+    error = UnclearTimeError(f"{what}: {reason}", remedy=remedy, where=table.source)
+    error.doubt, error.rows = unclear, len(table)
+    raise error

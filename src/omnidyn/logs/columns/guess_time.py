@@ -21,7 +21,10 @@ from omnidyn.logs.table.table import Table
 from omnidyn.units import TIME as TIME_UNIT
 from omnidyn.units import Unit, known_unit, parse_unit
 
-SHORTEST_STEP, LONGEST_STEP = 1e-4, 1.0  # [s] between rows: what a log of a robot may have
+SHORTEST_STEP, USUAL_STEP, LONGEST_STEP = 0.95e-4, 1.0, 10.5  # [s] between rows: what a log of a robot may have
+LONGEST_SLOW = 7200.0  # [s] that a log with rows slower than usual lasts: a sweep of a motor by hand or by a script
+NOWADAYS = 1e9, 2.5e9  # [s] since 1970: 2001 to 2049
+SAME_MOTION = 30.0  # a speed and what its position moved differ by less: a gear, degrees; units of time differ by 1000
 TIME_NAMES = ("s", "ms", "us", "ns")
 
 
@@ -61,7 +64,7 @@ def take_time(table: Table, assumed: Mapping[str, str], guess: Guess) -> None:
     text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
     unit = known_unit(text) or _unit(table, name, assumed)
     if unit is None:
-        unit = _plausible_time(floats(table.columns[name]), name, text, guess)
+        unit = _plausible_time(table, floats(table.columns[name]), name, text, guess)
     if unit is not None and unit.quantity == TIME_UNIT:
         guess.columns[TIME] = Column(name, unit.text)
     elif unit is not None:
@@ -77,7 +80,7 @@ def _take_steps(table: Table, name: str, assumed: Mapping[str, str], guess: Gues
     """A column that holds the time from row to row, where there is no other clock: it is summed up."""
     text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
     values = floats(table.columns[name])
-    unit = known_unit(text) or read_name(name).unit or _plausible_time(np.cumsum(values), name, text, guess)
+    unit = known_unit(text) or read_name(name).unit or _plausible_time(table, np.cumsum(values), name, text, guess)
     if unit is not None and unit.quantity == TIME_UNIT:
         guess.columns[TIME] = Column(name, unit.text)
     elif unit is not None:
@@ -102,23 +105,63 @@ def _increases(values: FloatArray | tuple[str, ...]) -> bool:
     return len(times) > 1 and float(np.mean(times[1:] > times[:-1])) > 0.9
 
 
-def _plausible_time(values: FloatArray, name: str, declared_unit: str, guess: Guess) -> Unit | None:
-    """The one unit under which rows are 0.1 ms to 1 s apart; None where there are two or none."""
+def _plausible_time(table: Table, values: FloatArray, name: str, declared_unit: str, guess: Guess) -> Unit | None:
+    """The one unit under which rows are as far apart as a log has them; None where there are two or none.
+
+    Of several, a clock that counts from 1970 or a motion that fits its speed leaves one.
+    """
+    if declared_unit and declared_unit not in ("-", "SI"):
+        guess.doubts.append(doubt(name, TIME, "unit_unknown", unit=declared_unit))
+        return None
     finite = values[np.isfinite(values)]
     steps = np.diff(finite)
     steps = steps[steps > 0.0]
     step = float(np.median(steps)) if steps.size else 0.0
     units = [parse_unit(text) for text in TIME_NAMES]
-    possible = [unit for unit in units if SHORTEST_STEP <= step * unit.size <= LONGEST_STEP]
-    if declared_unit and declared_unit not in ("-", "SI"):
-        guess.doubts.append(doubt(name, TIME, "unit_unknown", unit=declared_unit))
-        return None
+    possible = [unit for unit in units if _is_step(step * unit.size, len(finite))]
+    if len(possible) > 1:
+        since_1970 = [unit for unit in possible if NOWADAYS[0] <= finite[0] * unit.size <= NOWADAYS[1]]
+        possible = since_1970 if len(since_1970) == 1 else _of_motion(table, values, possible, guess)
     if len(possible) != 1:
         texts = tuple(unit.text for unit in possible)
         guess.doubts.append(doubt(name, TIME, "time_without_unit", texts or UNIT, step=step))
         return None
     guess.note("time_unit_taken", column=name, unit=possible[0].text, step_s=step * possible[0].size)
     return possible[0]
+
+
+def _is_step(step: float, rows: int) -> bool:
+    """Whether so many rows may be so far apart [s]: those slower than usual are few."""
+    return SHORTEST_STEP <= step <= LONGEST_STEP and (step <= USUAL_STEP or step * rows <= LONGEST_SLOW)
+
+
+def _of_motion(table: Table, times: FloatArray, possible: list[Unit], guess: Guess) -> list[Unit]:
+    """The units under which speeds are those of what is moved in the log; all of them where it has no such pair."""
+    steps = np.diff(times)
+    for speeds, places in _pairs(guess):
+        moved, expected = 0.0, 0.0
+        for speed, position in zip(speeds, places, strict=True):
+            rate, way = (floats(table.columns[column.name]) * column.factor for column in (speed, position))
+            pair = np.array([np.abs(np.diff(way)), np.abs(rate[1:] + rate[:-1]) / 2.0 * steps])
+            moved, expected = np.array([moved, expected]) + pair[:, np.isfinite(pair).all(axis=0)].sum(axis=1)
+        if not (moved > 0.0 and expected > 0.0):
+            continue
+        alike = [unit for unit in possible if 1.0 / SAME_MOTION < expected * unit.size / moved < SAME_MOTION]
+        if len(alike) == 1:
+            return alike
+    return possible
+
+
+def _pairs(guess: Guess) -> list[tuple[list[Column], list[Column]]]:
+    """Speeds and the positions that they move: of each wheel, of the heading, of the body along x and y."""
+    columns = guess.columns
+    names = [([f"w{key[1:]}"], [key]) for key in columns if re.fullmatch(r"a\d+", key)]
+    names += [(["omega"], ["heading"]), (["vx", "vy"], ["x", "y"])]
+    return [
+        ([columns[name] for name in speeds], [columns[name] for name in places])
+        for speeds, places in names
+        if columns.keys() >= {*speeds, *places}
+    ]
 
 
 def refuse_second_time(

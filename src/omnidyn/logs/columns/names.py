@@ -111,7 +111,8 @@ class NameParts(NamedTuple):
     """A name taken apart: roles of its words, the number of the wheel or None, the unit in it or None.
 
     before: what stands before the number, in small letters, without the unit; of a name with a place instead of a
-    number, all but the place. place: where its wheel stands [degree], see places.py.
+    number, all but the place. place: where its wheel stands [degree], see places.py. letter: of a name that is a small
+    letter and a number, but for its unit: d1, a2_deg.
     """
 
     roles: frozenset[str]
@@ -119,6 +120,7 @@ class NameParts(NamedTuple):
     unit: Unit | None
     before: str = ""
     place: float | None = None
+    letter: str = ""
 
     @property
     def of_one_wheel(self) -> bool:
@@ -129,7 +131,7 @@ class NameParts(NamedTuple):
 @lru_cache(4096)
 def read_name(name: str) -> NameParts:
     """The words of a column's name. A word that is not known counts as "other"."""
-    plain = _AGAIN.sub("", _without_accents(name[-MAX_NAME:].strip()))
+    plain = AGAIN.sub("", _without_accents(name[-MAX_NAME:].strip()))
     plain = re.sub(r"duty[ _-]?cycle", "duty", plain.replace("v_n", "vn"), flags=re.IGNORECASE)
     stem, unit = _without_unit(plain)
     stem = re.sub(r"(?<![A-Za-z])([FRBL]{2})(?=[A-Z][a-z])", r"\1 ", stem)  # FLPower
@@ -143,7 +145,8 @@ def read_name(name: str) -> NameParts:
     place, words_left = place_in(words, _ROLE) if number is None else (None, words)
     if place is not None:
         roles, before = {role for word in words_left for role in _roles(word)}, " ".join(words_left)
-    return NameParts(frozenset(roles), number, unit, before, place)
+    letter = match[1] if (match := re.fullmatch(r"([a-z])\d{1,2}", stem)) else ""
+    return NameParts(frozenset(roles), number, unit, before, place, letter)
 
 
 def _without_accents(name: str) -> str:
@@ -177,7 +180,7 @@ def _bare(part: str) -> str:
 
 
 BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\d\])][^\])]*)[\])]")  # a name and what looks like its unit, not joint[0]
-_AGAIN = re.compile(r"~\d+$")  # the second column of one name is called NAME~2
+AGAIN = re.compile(r"~\d+$")  # the second column of one name is called NAME~2
 _LAST = ("", "data", "value", "values")
 _SAYS_ITS_UNIT = ("rpm", "dps", "millis", "micros")  # a quantity and its unit in one word: rpm1, motor2Rpm, millis
 # In the middle of a name: a turn rate, a minimum, a section, what goes in.

@@ -21,7 +21,7 @@ class Range(NamedTuple):
     """What is usual of a channel, in SI.
 
     most: what its usual size can be. likely: low and high end of what it mostly is, which tells the unit. units: those
-    in which it is logged too, the likeliest first. counts: how a unit of counts is written, "" where none is logged;
+    in which it is logged too, the likeliest first. counts: how a unit of counts is written, "" where none is logged.
     most_counts: the largest of them.
     """
 
@@ -36,10 +36,9 @@ MOST_VOLTS = 100.0  # [V] of a motor's driver, or of a battery; more are other u
 VOLTS = Range(MOST_VOLTS, (3.0, 60.0), ("mV", "cV", "dV"), "V/COUNTS_PER_VOLT")
 SPEED = Range(20.0, (0.05, 6.0), ("mm/s", "cm/s", "in/s"))
 LENGTH = Range(500.0, (0.3, 50.0), ("mm", "cm", "in"))
-CURRENT = Range(200.0, (0.05, 60.0), ("mA",), "A/COUNTS_PER_AMPERE")
 RANGES = {
     "supply": VOLTS,
-    "i": CURRENT,
+    "i": Range(200.0, (0.05, 60.0), ("mA",), "A/COUNTS_PER_AMPERE"),
     "w": Range(3000.0, (1.0, 500.0), ("rpm", "deg/s"), "ticks/COUNTS_PER_TURN/s", math.inf),
     "vx": SPEED,
     "vy": SPEED,
@@ -64,12 +63,13 @@ def beyond_range(
     """The doubt, of no column yet, about values that a component cannot have in their unit; None where it can.
 
     limit: the most that a driver of the robot gives [V], where it is known. is_given: whether the file gives the unit.
-    Of a position the span counts, for its origin may be anywhere; one in a unit that is given may be far away. The
-    motors judge a current in a unit that is given: findings/scale.
+    Of a position the span counts, for its origin may be anywhere; one in a unit that is given may be far away. Whether
+    a unit that is given is right, a robot says better than a range (`check`), but for its supply.
     """
     letter = letter_of(component.removesuffix("_cmd"))
     limits, values = RANGES.get(letter), values[np.isfinite(values)]
-    if limits is None or not values.size or (limits in (LENGTH, CURRENT) and is_given):
+    judged = limits is LENGTH or (limit is not None and letter != "supply")
+    if limits is None or not values.size or (is_given and judged):
         return None
     if limits is LENGTH:
         size = float(np.diff(np.quantile(values, [1.0 - USUAL_SHARE, USUAL_SHARE]))[0])

@@ -138,8 +138,12 @@ def _dataset_tables(
             "no speeds of a base in the dataset",
             got=shortened(", ".join(dict.fromkeys(all_names)) or "no names", 200),
             expected=f"{', '.join(SPEEDS)} in {ACTION} or {STATE}",
+            remedy="give the dataset of a robot with a base that drives"
+            if all_names
+            else f'write what the numbers are into {INFO}: "names" of {ACTION} and {STATE}, in their order',
             where=source,
         )
+    _refuse_twins(names, source)
     units = {STAMP: "s"} | {column: unit for column, (*_, unit) in columns_of.items()}
     says = {STAMP: Declaration("t")} | {
         column: Declaration(component + "_cmd" * (feature == ACTION))
@@ -167,6 +171,20 @@ def _dataset_tables(
             yield table(columns, lines)
     total_digest = digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
     yield table({}, np.zeros(0, dtype=np.int64), total_digest)
+
+
+def _refuse_twins(names: Mapping[str, list[str]], source: str) -> None:
+    """Raises InputError where two numbers of a feature are called by one name of a speed: which is it?"""
+    for feature, feature_names in names.items():
+        for name in SPEEDS:
+            if feature_names.count(name) > 1:
+                raise InputError(
+                    "two numbers of a feature have one name",
+                    got=f"{name}, {feature_names.count(name)} times in {feature}",
+                    expected="a name for each number",
+                    remedy=f"correct its names in {INFO}",
+                    where=source,
+                )
 
 
 def _notes(episodes: int, unread: list[str]) -> tuple[str, ...]:

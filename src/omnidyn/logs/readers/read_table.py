@@ -102,7 +102,7 @@ def _tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterato
     if is_log_folder(path):
         suffix = ""
     promised = next((reader for reader in READERS if suffix.lower() in reader.suffixes), TEXT)
-    tables = completed(reader.tables(path, rows, options), reader.least)
+    tables = completed(reader.tables(path, rows, options), reader.least, rows)
     if promised is reader or not suffix:
         return tables
     note = f"the file holds {reader.word}, though its name ends in {suffix}"

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.recording import Recording
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import Table, join
 from omnidyn.progress import Progress, silent
 
 
@@ -46,15 +46,19 @@ class Reader(NamedTuple):
     variables: bool = False
 
 
-def completed(tables: Iterable[Table], minimum: str) -> Iterator[Table]:
-    """The tables that have rows, each once the next one is there: so the last of them has the hash and all notes."""
-    waiting: Table | None = None
+def completed(tables: Iterable[Table], minimum: str, rows: int = 0) -> Iterator[Table]:
+    """The tables that have rows, each once the next one is there: so the last of them has the hash and all notes.
+
+    rows: small ones that follow each other, as those of a dataset with a file per episode, are joined up to so many.
+    """
+    waiting: list[Table] = []
     table = None
     for table in tables:
         if len(table):
-            if waiting is not None:
-                yield waiting
-            waiting = table
-    if waiting is None:
+            if waiting and sum(map(len, waiting)) + len(table) > rows:
+                yield join(waiting)
+                waiting = []
+            waiting.append(table)
+    if not waiting:
         raise InputError("no rows", got="0 samples", expected=minimum, where=table.source if table is not None else "")
-    yield replace(waiting, sha256=table.sha256, notes=table.notes)  # type: ignore[union-attr]
+    yield replace(join(waiting), sha256=table.sha256, notes=table.notes)  # type: ignore[union-attr]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from omnidyn.document import all_of
 from omnidyn.statement import NOTE, Statement
-from omnidyn.telling.sentence import Sentence, by_number, either, names
+from omnidyn.telling.sentence import SOURCES, Sentence, by_number, either, names
 
 LIMITS = {
     "duty": "full duty",
@@ -24,12 +24,29 @@ def _quantised(statement: Statement) -> str:
 {cells}, up to {100 * n['share']:.0f} % of the usual value{hidden}"
 
 
+EQUAL_REASONS = {
+    "voltage": "their motors get different voltages",
+    "duty": "their motors get different duties",
+    "wheel_speed_command": "they were asked for different speeds",
+    "noise": "noise is never the same twice",
+}
+
+
 def _echo(statement: Statement) -> str:
     """A measurement that is the command of rows before."""
     rows = int(statement.numbers["rows"])
     row = {0: "the same row", 1: "the row before"}.get(rows, f"{rows} rows before")
     return f"{statement.numbers['channel'].replace('_', ' ')} is the command of {row}, to the last digit: no sensor \
 measured it"
+
+
+def _equal(statement: Statement) -> str:
+    """Two components that hold the same numbers."""
+    reason = statement.numbers["reason"]
+    why = EQUAL_REASONS.get(reason) or f"{SOURCES[reason]} says that they turn differently" if reason else ""
+    return f"{' and '.join(statement.subject.split())} are equal to the last digit in every row" + (
+        f", while {why}: one was logged in the place of the other" if reason else ""
+    )
 
 
 def _unsigned(statement: Statement) -> str:
@@ -139,6 +156,9 @@ SENTENCES = {
         _echo,
         "log what the encoders, the gyroscope or a camera measure; of a robot whose software does not, leave the "
         "column out",
+    ),
+    "equal": Sentence(
+        _equal, "look at what the program writes into these columns: each wheel has a counter of its own"
     ),
     "unsigned": Sentence(_unsigned, _unsigned_remedy),
     "saturation": Sentence(

@@ -45,7 +45,8 @@ def _summary(statement: Statement) -> str:
     """One line about a log."""
     n = statement.numbers
     rate = f" at {n['rate_Hz']:.4g} Hz" if n["rate_Hz"] > 0.0 else ""
-    return f"{statement.subject or 'log'}: {n['rows']} rows, {short(n['duration_s'], '.4g')} s{rate}: {severities(n)}"
+    duration = f", {short(n['duration_s'], '.4g')} s{rate}" if n["duration_s"] > 0.0 else ""
+    return f"{statement.subject or 'log'}: {n['rows']} rows{duration}: {severities(n)}"
 
 
 def severities(counts: Mapping[str, Any]) -> str:

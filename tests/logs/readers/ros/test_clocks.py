@@ -170,7 +170,7 @@ def test_a_slow_recording_whose_clock_is_set_back_is_still_told():
 
 STEP = 34_000_000  # [ns] between stamps, of simulated time
 PACES = st.floats(-1.0, 1.0).map(lambda power: 10.0**power)  # simulated seconds in a second of the recorder
-BREAKS = st.lists(st.tuples(st.floats(0.05, 0.95), st.floats(0.1, 30.0)), max_size=4)  # (where, how long [s])
+BREAKS = st.lists(st.tuples(st.floats(0.05, 0.95), st.floats(0.1, 60.0)), max_size=4)  # (where, how long [s])
 
 
 def received(true, pace, pauses, stalls, rng):
@@ -214,7 +214,7 @@ def test_where_a_clock_was_set_rows_keep_their_order_and_steps(pace, pauses, sta
     stamped, bare, _ = simulated(pace, pauses, stalls, seed)
     k = int(where * len(stamped.header))
     if not back:
-        jump += 300.0 if pauses or stalls else 0.0  # beyond what a pause of 30 s at ten times real time hides
+        jump += 5000.0 if pauses or stalls else 0.0  # beyond what eight of 60 s at ten times real time hide
     header = (
         stamped.header
         + 10**7 * S
@@ -259,6 +259,29 @@ def test_a_bag_of_a_simulation_lasts_as_long_as_its_stamps_say(tmp_path, pace, p
     run = omnidyn.read_log(write_mcap(maker, tmp_path / "log.mcap"))
     np.testing.assert_allclose(run.t - run.t[0], 0.034 * np.arange(1176), atol=1e-6)
     np.testing.assert_allclose(run.pose[:, 0], 0.01 * np.arange(1176))
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_only_what_was_lost_is_lost_at_any_pace(tmp_path, seed):
+    """A real-time factor of .1 to 10, a pause and a stall of up to 60 s, jitter; in every other bag 40 are lost."""
+    pytest.importorskip("mcap")
+    pytest.importorskip("rosbags")
+    rng, count = np.random.default_rng(seed), 400
+    pace, lost = 10.0 ** rng.uniform(-1.0, 1.0), 40 * (seed % 2)
+    pauses, stalls = (((rng.uniform(0.1, 0.9), rng.uniform(0.0, 60.0)),) for _ in range(2))
+    true = 5 * S + np.cumsum(np.rint(STEP * rng.uniform(1.0 - 0.2 * (seed % 3), 1.0, count))).astype(np.int64)
+    kept = np.delete(np.arange(count), np.arange(150, 150 + lost))
+    receive = received(true[kept], pace, pauses, stalls, rng)
+    maker = BagMaker(start=0)
+    for k, wall in zip(kept, receive, strict=True):
+        maker.odometry(true[k] / S, (0.01 * k, 0.0, 0.0), (0.3, 0.0, 0.0))
+        maker.said[-1].receive = int(wall)
+    log = omnidyn.load_log(write_mcap(maker, tmp_path / "log.mcap"))
+    np.testing.assert_allclose(log.t - log.t[0], (true[kept] - true[0]) / S, atol=2e-6)
+    np.testing.assert_allclose(log.channels["pose"][:, 0], 0.01 * kept)
+    gaps = omnidyn.check(log).of("gap")
+    assert [finding.count for finding in gaps] == [1] * bool(lost)
+    assert all(abs(finding.numbers["lost_rows"] - lost) < 0.2 * lost for finding in gaps)
 
 
 def test_stamps_that_go_back_again_and_again_are_no_time():

@@ -22,6 +22,7 @@ SEAM = SECOND  # what is put where the true time is not known: enough for a gap
 OTHER_CLOCK = SECOND  # two times of one message differ by less, where they are of one clock
 JUMP = SECOND // 2  # of a header against the time of reception
 USUAL_SHARE = 0.9  # of the steps of a topic are usual ones
+AT_ONCE = 3.0  # times faster than usual: what was held back comes so
 PACE_ROWS = 20  # in a stretch that shows how fast a clock runs
 OMNIDYN_TOPICS = "/omnidyn/"  # topics that are written with the time of the row as the time of reception
 YEAR_NS = 365 * 86_400 * SECOND
@@ -195,11 +196,14 @@ def _smoothed(topic: Clocked, notes: list[str]) -> Clocked:
         return topic
     header, receive = topic.header[rows], topic.receive[rows]
     # What a stamp is behind the time of reception, as fast as the clock of the stamps runs
-    offset = header - np.rint(_pace(header, receive) * (receive - receive[0])).astype(np.int64)
+    pace = _pace(header, receive)
+    offset = header - np.rint(pace * (receive - receive[0])).astype(np.int64)
     steps, jumps = np.diff(header), np.diff(offset)
     usual = int(np.quantile(np.abs(steps), USUAL_SHARE, method="lower"))
     is_set = (steps < 0) & (jumps < -JUMP) | (steps > usual + JUMP) & (jumps > JUMP)
     cuts = [k for k in np.flatnonzero(is_set).tolist() if abs(_jump(offset, k)) > JUMP]
+    at_once = steps > AT_ONCE * pace * np.diff(receive)
+    cuts = [k for k in cuts if steps[k] < 0 or _rise(offset, at_once, k) > JUMP]  # else rows were lost there
     if not cuts:
         return topic
     if len(cuts) > MOST_RESETS:
@@ -228,6 +232,20 @@ def _pace(header: IntArray, receive: IntArray) -> float:
     stretch = max(1, min(PACE_ROWS, len(header) // 10))
     ahead, passed = header[stretch:] - header[:-stretch], receive[stretch:] - receive[:-stretch]
     return float(np.median(ahead[passed != 0] / passed[passed != 0])) if passed.any() else 0.0
+
+
+def _rise(offset: IntArray, at_once: BoolArray, k: int) -> int:
+    """How much the offsets rise over row k and all that was held back with it, and then received at once.
+
+    Within that they tell nothing: they fall by what was held back, and rise again row by row.
+    """
+    first, last = k, k + 1
+    while first > 0 and at_once[first - 1]:
+        first -= 1
+    while last < len(at_once) and at_once[last]:
+        last += 1
+    first -= first < k  # the row before what was held back
+    return int(np.median(offset[last : last + 5]) - np.median(offset[max(0, first - 4) : max(0, first) + 1]))
 
 
 def _jump(offset: IntArray, k: int) -> int:

@@ -1,0 +1,77 @@
+"""Components of one channel that are equal to the last digit: one accumulator was logged in the place of two."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.findings.finding import Finding
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
+from omnidyn.findings.signal.reference import expected_wheel_speed
+from omnidyn.findings.signal.robust import quantum, white_noise
+from omnidyn.logs.channels import components
+from omnidyn.statement import ERROR, NOTE
+
+MEASURED = ("wheel_angle", "wheel_speed", "current", "twist")
+VALUES = 20  # different ones, at least: fewer may agree by chance
+DIFFERENT = 0.1  # of the larger of two inputs, by which they differ
+NOISY = 1e-3  # of the largest value: so much noise is never the same twice
+
+
+def check_copies(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """An error where their motors were given different inputs, or where both have one noise; they are masked then.
+
+    A note where nothing says that they should differ: wheels of a simulated robot that drives straight turn alike.
+    """
+    findings: list[Finding] = []
+    if len(work) < MIN_ROWS:
+        return findings, work
+    for channel in MEASURED:
+        values = work.get(channel)
+        if values is None or (channel == "wheel_speed" and work.derived_speed):
+            continue
+        names = components(channel, values.shape[1])
+        for j, k in combinations(range(values.shape[1]), 2):
+            if not _are_equal(values[:, j], values[:, k]):
+                continue
+            reason = _reason(work, channel, j, k)
+            numbers = {"reason": reason}
+            findings.append(Finding("equal", ERROR if reason else NOTE, f"{names[j]} {names[k]}", numbers))
+            for masked in (channel, "wheel_speed") if reason and work.derived_speed else (channel,) * bool(reason):
+                work = work.masked(masked, j, work.everywhere).masked(masked, k, work.everywhere)
+    return findings, work
+
+
+def _are_equal(one: FloatArray, other: FloatArray) -> bool:
+    """Whether both hold the same numbers wherever both were recorded, and many different ones."""
+    finite = np.isfinite(one) & np.isfinite(other)
+    return (
+        bool(finite.sum() >= MIN_ROWS and (one[finite] == other[finite]).all()) and len(np.unique(one[finite])) > VALUES
+    )
+
+
+def _reason(work: LogUnderCheck, channel: str, j: int, k: int) -> str:
+    """Why two components cannot be equal, a reason of `telling`; "" where they may."""
+    if channel != "twist":
+        for name in ("voltage", "duty", "wheel_speed_command"):
+            if _differ(work.get(name), j, k):
+                return name
+        expected = expected_wheel_speed(work, without="wheel_speed") if channel != "current" else None
+        if expected is not None and _differ(expected[1], j, k):
+            return expected[0]
+    values = work.channels[channel][:, j]
+    largest = float(np.nanmax(np.abs(values)))
+    return "noise" if channel != "wheel_angle" and not quantum(values) and white_noise(values) > NOISY * largest else ""
+
+
+def _differ(values: FloatArray | None, j: int, k: int) -> bool:
+    """Whether two columns differ, over a twentieth of the rows or more."""
+    if values is None or max(j, k) >= values.shape[1]:
+        return False
+    pair = values[np.isfinite(values[:, [j, k]]).all(axis=1)][:, [j, k]]
+    if len(pair) < MIN_ROWS:
+        return False
+    apart, size = np.quantile(np.abs(pair[:, 0] - pair[:, 1]), 0.95), np.quantile(np.abs(pair), 0.95)
+    return bool(apart > DIFFERENT * size > 0.0)

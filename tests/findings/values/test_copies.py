@@ -1,0 +1,50 @@
+"""One accumulator in two columns is named, whatever was logged of the motors; wheels that turn alike are not blamed."""
+
+import numpy as np
+import pytest
+
+from omnidyn.findings.check import check
+
+
+def copied(values, of=0, into=1):
+    values = values.copy()
+    values[:, into] = values[:, of]
+    return values
+
+
+@pytest.mark.parametrize("channel", ["wheel_speed", "current"])
+def test_a_copied_column_is_an_error_and_no_slip(log, robot, with_channels, channel):
+    for model in (robot, None):
+        verdict = check(with_channels(**{channel: copied(log.channels[channel])}), model)
+        (finding,) = verdict.of("equal")
+        letter = channel[0] if channel == "wheel_speed" else "i"
+        assert (finding.subject, finding.severity) == (f"{letter}1 {letter}2", "error")
+        assert "equal to the last digit in every row" in str(finding)
+        assert not {"slip", "swapped", "dead"} & {other.code for other in verdict.findings}
+
+
+def test_a_copied_accumulator_is_one_too(log, robot, with_channels):
+    counts = np.round(np.cumsum(log.channels["wheel_speed"], axis=0) * 0.01 * 2000 / (2 * np.pi)) * 2 * np.pi / 2000
+    verdict = check(with_channels(wheel_angle=copied(counts, 2, 0), wheel_speed=None), robot)
+    (finding,) = verdict.of("equal")
+    assert (finding.subject, finding.severity) == ("a1 a3", "error")
+    assert not verdict.of("slip")
+
+
+def test_noise_alone_says_that_one_is_a_copy(log, with_channels):
+    verdict = check(
+        with_channels(wheel_speed=copied(log.channels["wheel_speed"]), voltage=None, current=None, twist=None)
+    )
+    (finding,) = verdict.of("equal")
+    assert finding.numbers["reason"] == "noise"
+
+
+def test_wheels_that_turn_alike_without_noise_are_a_note(log, with_channels):
+    speed = np.round(5.0 * np.sin(0.01 * np.arange(len(log))), 1)[:, None] * [1.0, 1.0, -1.0]
+    voltage = 0.4 * speed
+    verdict = check(with_channels(wheel_speed=speed, voltage=voltage, current=None, twist=None, pose=None))
+    assert {finding.severity for finding in verdict.of("equal")} == {"note"}
+
+
+def test_a_clean_log_has_no_copies(log, robot):
+    assert not check(log, robot).of("equal")
