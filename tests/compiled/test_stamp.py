@@ -69,7 +69,9 @@ def imports(tree):
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, "stamp.py knows no relative imports"
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.Call) and "import_module" in (getattr(node.func, name, "") for name in ("attr", "id")):
+        elif isinstance(node, ast.Call) and "import_module" in (
+            getattr(node.func, name, "") for name in ("attr", "id")
+        ):
             yield from [node.args[0].value] if isinstance(node.args[0], ast.Constant) else []
         yield from imports(node)
 
