@@ -84,6 +84,7 @@ def say(words):
 
 DROPPED = ("PYTHONPATH", "PYTHONHOME", "PYTHONSTARTUP", "PYTHONSAFEPATH")
 DROPPED += ("VIRTUAL_ENV", "__PYVENV_LAUNCHER__")
+DROPPED += ("PYTHONDONTWRITEBYTECODE",)  # every process that a test starts would compile all it imports anew
 # Of PIP_* and UV_* these stay: where packages come from, whom to trust, how to get there. The others
 # (TARGET, PREFIX, USER, CONSTRAINT, NO_DEPS ...) change what is installed, or where.
 KEPT = ("INDEX", "LINKS", "HOST", "CERT", "TLS", "PROXY", "HTTP", "TIMEOUT", "RETRIES")

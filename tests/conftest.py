@@ -3,6 +3,7 @@
 OMNIDYN_HYPOTHESIS=thorough tries 50 times as many examples, and other ones in each run.
 """
 
+import gc
 import os
 import signal
 import time
@@ -16,6 +17,8 @@ from tests.support.processor_times import OPTION, ProcessorTimes
 
 # Workers of pytest-xdist have the processors already; set before the first test loads NumPy.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+gc.disable()  # until all tests are collected: there is little garbage among so much that stays
 
 # Output is wrapped as it is without a terminal; the processes of pytest-xdist are told 80 columns.
 os.environ.pop("COLUMNS", None)
@@ -57,6 +60,12 @@ def pytest_collection_modifyitems(config, items):
         long = [item for item in items if item.get_closest_marker("long")]
         config.hook.pytest_deselected(items=long)
         items[:] = [item for item in items if item not in long]
+
+
+def pytest_collection_finish():
+    """What was collected stays until the end: no collection of garbage walks over it again."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_runtest_setup(item):

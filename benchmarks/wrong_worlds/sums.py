@@ -45,8 +45,7 @@ def march_sum(p, since, command, wanted, step, states):
             row, until = held_until(since, command, row, now, wanted[k], u)
             if until - now > 1e-12:
                 steps = int(np.ceil((until - now) / step))
-                for _ in range(steps):
-                    _step(p, y, u, (until - now) / steps, held, plane)
+                _steps(p, y, u, (until - now) / steps, steps, held, plane)
                 now = until
             if now >= wanted[k] - 1e-12:
                 break
@@ -54,37 +53,50 @@ def march_sum(p, since, command, wanted, step, states):
 
 
 @numba.njit
-def _step(p, y, u, h, held, plane):
-    """One step of length h; held (k,), plane (2,): what friction took in the step before, and takes in this one [N]."""
-    matrix, right = p.M + h * p.damping, np.zeros(3)
+def _steps(p, y, u, h, steps, held, plane):
+    """Steps of length h; held (k,), plane (2,): what friction took before, and takes in the last of them [N]."""
+    matrix, driven = p.M + h * p.damping, np.zeros(3)
     for i in range(u.size):
         for a in range(3):
-            right[a] += h * p.G[a, i] * p.kt[i] * u[i] / p.R[i]
+            driven[a] += h * p.G[a, i] * p.kt[i] * u[i] / p.R[i]
             for b in range(3):
                 matrix[a, b] += h * p.G[a, i] * p.kt[i] ** 2 / p.R[i] * p.G[b, i]
-    right[0] += h * p.turning * y[2] * y[1]
-    right[1] -= h * p.turning * y[2] * y[0]
-    right += p.M @ y[:3]
     inverse = np.linalg.inv(matrix)
-    right -= h * (p.d.T @ held)
-    right[:2] -= h * plane
-    v = inverse @ right
     ways = p.d @ inverse  # it is symmetric
+    size = h * (ways * p.d).sum(axis=1)  # what 1 N takes of the speed along its own element
+    right, v = np.zeros(3), np.zeros(3)
+    for _ in range(steps):
+        for a in range(3):
+            right[a] = driven[a] + p.M[a, 0] * y[0] + p.M[a, 1] * y[1] + p.M[a, 2] * y[2]
+            for k in range(held.size):
+                right[a] -= h * p.d[k, a] * held[k]
+        right[0] += h * (p.turning * y[2] * y[1] - plane[0])
+        right[1] -= h * (p.turning * y[2] * y[0] + plane[1])
+        for a in range(3):
+            v[a] = inverse[a, 0] * right[0] + inverse[a, 1] * right[1] + inverse[a, 2] * right[2]
+        _settle(p, v, h, inverse, ways, size, held, plane)
+        for a in range(3):
+            y[3 + a] += 0.5 * h * (y[a] + v[a])
+            y[a] = v[a]
+
+
+@numba.njit
+def _settle(p, v, h, inverse, ways, size, held, plane):
+    """What friction takes in a step, element by element, until none changes; v follows."""
     for _ in range(SWEEPS):
         change = 0.0
-        for k in range(len(p.d)):
-            way = ways[k]
-            new = held[k] + (p.d[k] @ v) / (h * (p.d[k] @ way))
-            new = min(max(new, -p.level[k]), p.level[k])
-            v -= h * (new - held[k]) * way
-            change = max(change, abs(new - held[k]))
+        for k in range(held.size):
+            along = p.d[k, 0] * v[0] + p.d[k, 1] * v[1] + p.d[k, 2] * v[2]
+            new = min(max(held[k] + along / size[k], -p.level[k]), p.level[k])
+            more = new - held[k]
+            for a in range(3):
+                v[a] -= h * more * ways[k, a]
+            change = max(change, abs(more))
             held[k] = new
         if p.plane[0] > 0.0:
             change = max(change, _on_plane(p, v, h, inverse, plane))
         if change < SETTLED:
             break
-    y[3:6] += 0.5 * h * (y[:3] + v)
-    y[:3] = v
 
 
 @numba.njit
@@ -97,6 +109,8 @@ def _on_plane(p, v, h, inverse, plane):
         low, high = 0.0, a * abs(x) + b * abs(y) + abs(x) * a + abs(y) * b
         for _ in range(200):  # (a x/(a^2 + t))^2 + (b y/(b^2 + t))^2 = 1, by halving
             t = 0.5 * (low + high)
+            if t in (low, high):  # no number between them
+                break
             if (a * x / (a * a + t)) ** 2 + (b * y / (b * b + t)) ** 2 > 1.0:
                 low = t
             else:

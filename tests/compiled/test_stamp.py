@@ -8,6 +8,7 @@ import pkgutil
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -68,29 +69,33 @@ def imports(tree):
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, "stamp.py knows no relative imports"
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.Call) and "import_module" in ast.unparse(node.func):
+        elif isinstance(node, ast.Call) and "import_module" in (
+            getattr(node.func, name, "") for name in ("attr", "id")
+        ):
             yield from [node.args[0].value] if isinstance(node.args[0], ast.Constant) else []
         yield from imports(node)
 
 
-GRAPH = {
-    file: set().union(
-        *map(carried_out, (n for n in imports(ast.parse(file.read_bytes())) if n.split(".")[0] == "omnidyn"))
-    )
-    for file in FILES
-}
+@cache
+def graph():
+    """File -> the files that it imports."""
+    found = {}
+    for file in FILES:
+        names = {name for name in imports(ast.parse(file.read_bytes())) if name.split(".")[0] == "omnidyn"}
+        found[file] = set().union(*map(carried_out, names))
+    return found
 
 
 def closure(file):
     found = carried_out(module_of(file))
-    while new := set().union(*(GRAPH[each] for each in found)) - found:
+    while new := set().union(*(graph()[each] for each in found)) - found:
         found |= new
     return found
 
 
-@pytest.mark.parametrize("file", FILES, ids=module_of)
-def test_imports_found_by_pattern_are_those_of_the_syntax_tree(file):
-    assert {Path(each) for each in stamp.read(str(file))[1]} - {file} == GRAPH[file] - {file}
+def test_imports_found_by_pattern_are_those_of_the_syntax_tree():
+    by_pattern = {file: {Path(each) for each in stamp.read(str(file))[1]} - {file} for file in FILES}
+    assert by_pattern == {file: imported - {file} for file, imported in graph().items()}
 
 
 @pytest.mark.parametrize(
@@ -173,7 +178,8 @@ def test_all_that_python_loads_for_a_kernel_is_in_its_stamp():
 # ---- what an edit recompiles ------------------------------------------------------------------------------
 
 
-def test_each_file_edited_in_turn_changes_the_stamps_that_reach_it(tmp_path, fresh):
+def test_each_file_edited_in_turn_changes_the_stamps_that_reach_it(tmp_path, fresh, monkeypatch):
+    monkeypatch.setattr(stamp, "imported", cache(stamp.imported))  # of a text: it takes most of the time
     copy = tmp_path / "omnidyn"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
     fresh(copy)

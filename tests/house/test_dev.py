@@ -165,6 +165,7 @@ def test_docs_says_where_they_are(monkeypatch, capfd):
 
 def test_what_leads_astray_is_dropped_and_where_packages_come_from_is_kept():
     astray = "PYTHONPATH PYTHONHOME PIP_TARGET PIP_PREFIX PIP_USER PIP_CONSTRAINT UV_TARGET UV_PYTHON"
+    astray += " PYTHONDONTWRITEBYTECODE"
     kept = "PATH HOME PIP_INDEX_URL PIP_FIND_LINKS PIP_CERT PIP_NO_INDEX UV_INDEX_URL UV_DEFAULT_INDEX"
     kept += " SSL_CERT_FILE HTTPS_PROXY PIP_PROXY PIP_TRUSTED_HOST PIP_CACHE_DIR UV_CACHE_DIR PIP_CONFIG_FILE"
     env = dev.clean_env(dict.fromkeys((astray + " " + kept).split(), "set"))

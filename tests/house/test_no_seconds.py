@@ -5,6 +5,7 @@ takes is for benchmarks. What ends a test that hangs is patient.
 """
 
 import ast
+import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -18,6 +19,7 @@ OF_MODULES = {"time": {"time", "time_ns"}, "os": {"times"}}  # names that may me
 OF_RESOURCES = {"ru_utime", "ru_stime"}
 IN_THE_BROWSER = "performance.now"
 PATIENT = 100.0  # [s] at least, for what hangs
+WORDS = re.compile("|".join({*CLOCKS, "time", *OF_RESOURCES, re.escape(IN_THE_BROWSER)}))  # no time without one of them
 ALLOWED = {"conftest.py": "no long study begins late"}
 
 
@@ -42,9 +44,10 @@ def is_timed(node: ast.AST, timed: set[str]) -> bool:
 def timed_names(tree: ast.AST) -> set[str]:
     """Names that are given a time somewhere in a file, directly or by others."""
     timed: set[str] = set()
+    given = list(_given(tree))
     while True:
         before = len(timed)
-        for target, value in _given(tree):
+        for target, value in given:
             if is_timed(value, timed):
                 timed |= {node.id for node in ast.walk(target) if isinstance(node, ast.Name)}
         if len(timed) == before:
@@ -90,8 +93,9 @@ def hurries(tree: ast.AST) -> list[int]:
 
 @cache
 def files() -> list[tuple[str, ast.AST]]:
-    """(name, tree) of all tests."""
-    return [(path.relative_to(TESTS).as_posix(), ast.parse(path.read_text("utf-8"))) for path in TESTS.rglob("*.py")]
+    """(name, tree) of all tests that speak of time."""
+    texts = [(path.relative_to(TESTS).as_posix(), path.read_text("utf-8")) for path in TESTS.rglob("*.py")]
+    return [(name, ast.parse(text)) for name, text in texts if WORDS.search(text)]
 
 
 def test_no_test_asks_for_seconds():

@@ -4,6 +4,8 @@ Statements, not lines: the formatter lays out lines, and an argument list of one
 """
 
 import ast
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
@@ -16,44 +18,54 @@ KEPT = {
 }
 
 
-def trees() -> dict[str, ast.Module]:
-    """Path inside the package -> tree."""
-    return {
-        path.relative_to(PACKAGE).as_posix(): ast.parse(path.read_text("utf-8"))
-        for path in sorted(PACKAGE.rglob("*.py"))
-    }
-
-
 def statements(tree: ast.AST) -> int:
     """Statements in a file or a function."""
     return sum(isinstance(node, ast.stmt) for node in ast.walk(tree)) - isinstance(tree, ast.stmt)
 
 
-def long_ones() -> dict[str, int]:
-    """What is longer than it should be, with its statements."""
-    found = {}
-    for name, tree in trees().items():
-        if statements(tree) > FILE:
-            found[name] = statements(tree)
-        for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and statements(node) > FUNCTION:
-                found[f"{name}: {node.name}"] = statements(node)
-    return found
+def long_ones(name: str, tree: ast.Module) -> Iterator[tuple[str, int]]:
+    """What is longer than it should be in a file, with its statements."""
+    if (count := statements(tree)) > FILE:
+        yield name, count
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and (count := statements(node)) > FUNCTION:
+            yield f"{name}: {node.name}", count
+
+
+def private_ones(name: str, tree: ast.Module) -> Iterator[str]:
+    """What a file imports that another keeps to itself."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("omnidyn"):
+            for alias in node.names:
+                if alias.name.startswith("_") and not alias.name.startswith("__"):
+                    yield f"{name}: {alias.name} of {node.module}"
+
+
+@cache
+def found() -> tuple[dict[str, int], list[str]]:
+    """Of all files: what is long, and what is private. Each is read once, and its tree let go."""
+    long: dict[str, int] = {}
+    private: list[str] = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        name, tree = path.relative_to(PACKAGE).as_posix(), ast.parse(path.read_text("utf-8"))
+        long.update(long_ones(name, tree))
+        private += private_ones(name, tree)
+    return long, private
 
 
 def test_files_and_functions_are_short():
-    found = long_ones()
-    assert not {name: count for name, count in found.items() if name not in KEPT}
-    assert not [name for name in KEPT if name not in found], "short by now: take it from the list"
+    long, _ = found()
+    assert not {name: count for name, count in long.items() if name not in KEPT}
+    assert not [name for name in KEPT if name not in long], "short by now: take it from the list"
 
 
 def test_private_names_stay_in_their_file():
-    found = [
-        f"{name}: {alias.name} of {node.module}"
-        for name, tree in trees().items()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("omnidyn")
-        for alias in node.names
-        if alias.name.startswith("_") and not alias.name.startswith("__")
-    ]
-    assert not found
+    _, private = found()
+    assert not private
+
+
+def test_it_sees_what_is_long_and_what_is_private():
+    body = "    a = 1\n" * (FUNCTION + 1)
+    tree = ast.parse(f"from omnidyn.run import Run, _own, __version__\nfrom numpy import _core\ndef f():\n{body}")
+    assert list(long_ones("x.py", tree)) == [("x.py: f", FUNCTION + 1)]
+    assert list(private_ones("x.py", tree)) == ["x.py: _own of omnidyn.run"]

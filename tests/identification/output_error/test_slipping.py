@@ -74,7 +74,7 @@ def test_a_right_model_of_wheels_that_slip_is_found_right(fit):
 def test_a_wrong_mass_is_found_though_wheels_slip():
     heavy = ROBOT.replace(body=ROBOT.body.replace(mass=1.4 * ROBOT.body.mass))
     wrong = identify(
-        log(1, 3.0),
+        log(1, 1.5),
         heavy,
         OutputError(free=("friction", "wheels.traction_mu"), outputs=("twist", "wheel_speed"), nuisances=()),
     ).estimate
@@ -84,7 +84,7 @@ def test_a_wrong_mass_is_found_though_wheels_slip():
 def test_a_wrong_mass_is_fitted_by_default_though_no_constant_force_can_be_tried():
     """Coloured errors ask for one, and the engine of wheels that slip knows none: it ended in a refusal."""
     heavy = ROBOT.replace(body=ROBOT.body.replace(mass=1.4 * ROBOT.body.mass))
-    estimate = identify(log(2, 3.0), heavy, OutputError(free="friction"), quick=True).estimate
+    estimate = identify(log(2, 1.5), heavy, OutputError(free="friction"), quick=True).estimate
     assert not [name for name in estimate.nuisances if name.startswith(("push", "tilt"))]
 
 

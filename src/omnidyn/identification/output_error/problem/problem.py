@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -55,17 +56,20 @@ class Piece:
 
 
 class Fitted:
-    """What the solver needs of a problem, whatever it is that moves: parameters, and the pieces that are fitted to."""
+    """What the solver needs of a problem, whatever it is that moves: parameters, and the pieces that are fitted to.
+
+    What all pieces have in common is found once: each piece asks for it at each point of a fit.
+    """
 
     parameters: tuple[Parameter, ...]
     pieces: tuple[Piece, ...]
 
-    @property
+    @cached_property
     def columns(self) -> tuple[Column, ...]:
         """All output columns of all records, each once."""
         return tuple(dict.fromkeys(column for piece in self.pieces for column in piece.record.columns))
 
-    @property
+    @cached_property
     def tick(self) -> FloatArray:
         """The largest tick of each column in any record, 0 where it is not counted. Shape (columns,)."""
         largest_ticks = dict.fromkeys(self.columns, 0.0)
@@ -74,13 +78,17 @@ class Fitted:
                 largest_ticks[column] = max(largest_ticks[column], tick)
         return np.array(list(largest_ticks.values()))
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
 
+    @cached_property
+    def _index_by_name(self) -> dict[str, int]:
+        return {name: k for k, name in enumerate(self.names)}
+
     def where(self, name: str) -> int:
         """Index of a parameter by its name, -1 where it is not free."""
-        return self.names.index(name) if name in self.names else -1
+        return self._index_by_name.get(name, -1)
 
     def start(self) -> Point:
         """Where the fit starts."""
