@@ -9,8 +9,7 @@ import numpy
 import pytest
 
 import omnidyn
-from omnidyn.cli import main
-from omnidyn.cli.installation import doctor
+from omnidyn.cli import doctor, main
 
 
 def seen(capsys, *arguments):

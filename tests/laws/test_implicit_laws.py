@@ -82,7 +82,7 @@ def test_what_is_switched_off_is_absent(shape, electrical):
 
 
 def test_the_paper_robot_on_either_engine():
-    """Table 3 on the implicit engine, kept from the exact one by brushes that drop next to nothing: to tol, rests alike."""
+    """Table 3 on the implicit engine, kept from the exact one by a drop of next to nothing: to tol, rests alike."""
     for seed in range(5):
         voltage = program(10 + seed)
         one, other = simulate(AXEBOT, voltage, 5e-3), simulate(implicit(AXEBOT), voltage, 5e-3, tol=TOL)

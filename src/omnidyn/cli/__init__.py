@@ -5,8 +5,8 @@ Exit codes: 0 ok, 1 our bug, 2 usage, 3 bad input, 4 the data cannot answer, 5 a
 
 app has all commands. One file for each, or for those that belong together: init (the robot itself in init_robot),
 check, identify (its logs in identify_logs, what it writes in identify_show), compare, simulate, loops (`track`,
-`tune`), sweep, at_rest (`deadzone`), exchange (`import`, `export`), logs (`convert`), demo, warm. What they share:
-log_options, outcome (how a command ends), terminal/.
+`tune`), sweep, at_rest (`deadzone`), exchange (`import`, `export`), logs (`convert`), demo, warm, doctor. What they
+share: log_options, outcome (how a command ends), terminal/.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from omnidyn.cli import (
     check,
     compare,
     demo,
+    doctor,
     exchange,
     identify,
     init,
@@ -22,8 +23,8 @@ from omnidyn.cli import (
     loops,
     simulate,
     sweep,
+    warm,
 )
-from omnidyn.cli.installation import doctor, warm
 from omnidyn.cli.terminal.help import Grouped
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import show

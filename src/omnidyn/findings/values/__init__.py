@@ -1,1 +1,1 @@
-"""Single channels: values (and echoes of commands), stuck, codes (and spikes)."""
+"""Single channels: values (and echoes of commands), stuck, copies (of another channel), codes (and spikes)."""
