@@ -90,6 +90,13 @@ def align(first: Run, second: Run) -> Alignment:
 
     Sensors that both have tell it; commands only where they have no sensor in common, for these jump between rows.
     Raises InsufficientDataError where nothing that both recorded changes.
+
+    >>> import numpy as np, omnidyn
+    >>> volts = np.repeat(np.random.default_rng(0).uniform(-5.0, 5.0, (20, 3)), 40, axis=0)
+    >>> run = omnidyn.simulate(omnidyn.load_robot("axebot"), volts, dt=0.01)
+    >>> tracker = omnidyn.Run(t=run.t + 100.0, twist=run.twist)
+    >>> round(omnidyn.align(run, tracker).offset, 3)
+    -100.0
     """
     runs = as_run(first), as_run(second)
     signals = [_signals(run) for run in runs]

@@ -187,6 +187,16 @@ def drift(fits: Sequence[Robot | str | os.PathLike], names: Sequence[str] = ()) 
     The covariances are those that `identify` writes, fits count as independent, and intervals are those of a normal
     number. Raises InputError for fewer than two fits and for a file without fitted numbers, InsufficientDataError
     where no number is in two of them.
+
+    >>> import numpy as np, omnidyn
+    >>> def fit(robot, seed):
+    ...     rng = np.random.default_rng(seed)
+    ...     run = omnidyn.simulate(robot, np.repeat(rng.uniform(-5.0, 5.0, (20, 3)), 40, axis=0), dt=0.01)
+    ...     log = omnidyn.Run(t=run.t, voltage=run.voltage, twist=run.twist + 0.005 * rng.normal(size=run.twist.shape))
+    ...     return omnidyn.identify(log, robot, quick=True).robot
+    >>> robot = omnidyn.load_robot("axebot")
+    >>> print(omnidyn.drift([fit(robot, 1), fit(robot, 2)], ["Monday", "Tuesday"]).verdict)
+    no number of 6 changed by more than its errors allow
     """
     if len(fits) < 2 or isinstance(fits, str | os.PathLike | Robot):
         got = "one" if isinstance(fits, str | os.PathLike | Robot) else str(len(fits))

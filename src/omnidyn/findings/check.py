@@ -78,6 +78,12 @@ def check(log: Log | Run, robot: Robot | None = None) -> Verdict:
     base are gone, for a Run has none. The verdict has errors where the log gives wrong results as it stands; it says
     what the log can be used for, and keeps it, to be drawn by its `plot()`.
     Never raises for what the log holds; InputError for what is neither, or where log and robot are swapped.
+
+    >>> import omnidyn
+    >>> robot = omnidyn.load_robot("axebot")
+    >>> run = omnidyn.simulate(robot, [[0.0, 3.0, -3.0]] * 100 + [[2.0, 2.0, 2.0]] * 100, dt=0.02)
+    >>> omnidyn.check(run, robot).has_errors
+    False
     """
     check_order("check(log) or check(log, robot)", (log, (Log, Run)), (robot, (Robot, type(None))))
     log = as_run(log)

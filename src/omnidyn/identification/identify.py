@@ -95,6 +95,15 @@ def identify(
 
     Raises InputError for what cannot be used and for what a method does not take, InsufficientDataError where the logs
     cannot answer, UnsupportedError for robots and logs that a method does not know.
+
+    >>> import numpy as np, omnidyn
+    >>> robot, rng = omnidyn.load_robot("axebot"), np.random.default_rng(0)
+    >>> run = omnidyn.simulate(robot, np.repeat(rng.uniform(-5.0, 5.0, (20, 3)), 40, axis=0), dt=0.01)
+    >>> log = omnidyn.Run(t=run.t, voltage=run.voltage, twist=run.twist + 0.005 * rng.normal(size=run.twist.shape))
+    >>> found = omnidyn.identify(log, robot, quick=True)
+    >>> low, high = found.ci95["friction.axes.coulomb[0]"]
+    >>> low < 2.2 < high
+    True
     """
     check_order("identify(logs, robot)", (logs, (Run, Log, SteadyTable, MotorTable)), (robot, (Robot, type(None))))
     refuse_unless_method(method)

@@ -57,6 +57,11 @@ def simulate(
 
     Raises InputError for wrong shapes, NaN, infinite values, a start beyond 1e3 m/s, dt outside 1e-9..3600 s, a missing
     supply, or a tol outside 1e-10..1 m/s.
+
+    >>> import omnidyn
+    >>> run = omnidyn.simulate(omnidyn.load_robot("axebot"), [[0.0, 3.0, -3.0]] * 50, dt=0.02)
+    >>> run.twist.shape, bool(run.twist[-1, 0] > 0.3)
+    ((51, 3), True)
     """
     call = "simulate(robot, voltage, dt)"
     if not isinstance(robot, Robot):

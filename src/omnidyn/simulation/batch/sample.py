@@ -89,6 +89,11 @@ def sample(
         factors: The same in shares of the value, such as (0.8, 1.2).
 
     Raises InputError for a range that the robot cannot have, InsufficientDataError where nothing has a std.
+
+    >>> import omnidyn
+    >>> robots = omnidyn.sample(omnidyn.load_robot("axebot"), 3, factors={"body.mass_kg": (0.8, 1.2)})
+    >>> omnidyn.simulate_batch(robots, [[0.0, 3.0, -3.0]] * 50, dt=0.02).twist.shape
+    (3, 3)
     """
     center = fit if isinstance(fit, Robot) else getattr(fit, "robot", None)
     if not isinstance(center, Robot):
