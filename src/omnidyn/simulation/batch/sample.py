@@ -92,7 +92,7 @@ def sample(
 
     >>> import omnidyn
     >>> robots = omnidyn.sample(omnidyn.load_robot("axebot"), 3, factors={"body.mass_kg": (0.8, 1.2)})
-    >>> omnidyn.simulate_batch(robots, [[0.0, 3.0, -3.0]] * 50, dt=0.02).twist.shape
+    >>> omnidyn.simulate_batch(robots, [[0.0, 3.0, -3.0]] * 50, dt=0.02).end.twist.shape
     (3, 3)
     """
     center = fit if isinstance(fit, Robot) else getattr(fit, "robot", None)
