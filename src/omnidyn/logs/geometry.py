@@ -251,9 +251,8 @@ def _rows(twist: FloatArray, speed: FloatArray, of_wheels: bool) -> FloatArray:
         together = together[: twist.shape[1]]
         way, *_ = np.linalg.lstsq(speed @ together.T, twist, rcond=None)
         if np.linalg.cond(way) < 1.0 / np.finfo(float).eps:
-            return np.linalg.inv(way) @ together
-    rows, *_ = np.linalg.lstsq(twist, speed, rcond=None)
-    return rows
+            return np.asarray(np.linalg.inv(way) @ together, dtype=float)
+    return np.asarray(np.linalg.lstsq(twist, speed, rcond=None)[0], dtype=float)
 
 
 # How far the body and the wheels went in windows of time, each by the samples of its own sensor
