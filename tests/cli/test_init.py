@@ -658,6 +658,18 @@ def test_a_gear_that_is_given_stands_between_counts_at_the_motor_and_the_wheel(c
     assert (robot.motor.gear_ratio, robot.priors["motor.gear_ratio"]) == (5.0, Prior(origin="given"))
 
 
+def test_wheels_that_count_the_other_way_are_turned_and_said(call, counted):
+    rows = np.loadtxt(counted / "log.csv", delimiter=",", skiprows=1) * [1, -1, 1, -1, 1, 1, 1, 1]
+    head = "t_s,a1,a2,a3,a4,x_m,y_m,heading_rad"
+    np.savetxt(counted / "log.csv", rows, delimiter=",", header=head, comments="", fmt="%.6f")
+    code, _, err = call("init", "bot", *COUNTS, "--gear-ratio", "5")
+    assert code == 0
+    assert "wheels 1,3 count clockwise: turned; say --column a1=-NAME --column a3=-NAME elsewhere" in err
+    robot = load_robot(counted / "bot.toml")
+    assert robot.wheels.wheel_radius == pytest.approx(RADIUS, rel=0.01)
+    assert robot.wheels.robot_radius == pytest.approx(ARM, rel=0.01)
+
+
 def test_a_gear_beside_counts_of_nobody_knows_which_shaft_is_a_condition(call, counted):
     code, _, err = call("init", "bot", *COUNTS[:-1], "a=ticks/42", "--gear-ratio", "5")
     assert code == 0

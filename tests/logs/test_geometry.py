@@ -7,7 +7,8 @@ import pytest
 
 from omnidyn import load_robot
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.logs.geometry import as_mecanum, mean_speeds, wheel_geometry
+from omnidyn.logs.geometry import as_mecanum, mean_speeds, turned_wheels, wheel_geometry
+from omnidyn.logs.read_log import LogOptions, load_log
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from tests.support.staggered import Logged, Topic, plant
@@ -83,7 +84,14 @@ def test_mecanum_wheels_are_no_omni_wheels():
     preset = load_robot("mecanum").wheels
     other = wheel_geometry([run.replace(wheel_speed=wheel_speed(preset, twist))])
     assert as_mecanum(other).robot_radius == pytest.approx(preset.robot_radius)
-    other = run.replace(wheel_speed=speed * [-1.0, 1.0, 1.0, 1.0])
+    backward = wheel_geometry([run.replace(wheel_speed=speed * [-1.0, 1.0, 1.0, -1.0])])
+    assert turned_wheels(backward) == (1, 4)
+    assert as_mecanum(backward).robot_radius == pytest.approx(0.35)
+    all_back = wheel_geometry([run.replace(wheel_speed=-speed)])
+    assert turned_wheels(all_back) == (1, 2, 3, 4)
+    assert as_mecanum(all_back).robot_radius == pytest.approx(0.35)
+    assert turned_wheels(wheel_geometry([run.replace(twist=twist * [1.0, 1.0, -1.0])])) == ()  # the heading is turned
+    other = run.replace(wheel_speed=speed[:, [1, 0, 2, 3]])
     with pytest.raises(InputError, match="front left, front right, rear left, rear right"):
         as_mecanum(wheel_geometry([other]))
 
@@ -162,6 +170,52 @@ def test_commands_that_contradict_do_not_hide_what_was_measured():
     turned = np.roll(run.wheel_speed, 300, axis=0)
     both = run.replace(twist_command=run.twist, wheel_speed_command=turned, pose=None)
     found = wheel_geometry([both])
-    assert found.source == "twist and wheel_speed"
+    assert found.source in ("twist and wheel_speed", "twist and wheel_angle")
+    assert found.residual < 0.02
     with pytest.raises(InputError, match="do not follow the body as omni wheels do"):
         wheel_geometry([both.replace(twist=None)])
+
+
+# A mecanum robot with counts at its motors, seen by cameras: r .0757 m, half length plus half width .364 m
+
+RADIUS, ARM, GEAR, COUNTS = 0.0757, 0.364, 5.0, 42
+
+
+def camera_log(path, seed, glitches=False):
+    """By hand, rollers in an X. 170 Hz, 30 s, noise of .2 to 10 mm, 1 to 50 mrad; in half some wheels count back."""
+    rng, dt, every = np.random.default_rng(seed), 1.0 / 1700.0, 10
+    t = np.arange(0.0, 30.0, dt)
+    waves = [0.05, 0.11, 0.23, 0.41]
+    vx, vy, turn = (
+        sum(size * rng.normal() * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0)) for f in waves)
+        for size in (0.1, 0.1, 0.3)
+    )
+    heading = np.cumsum(turn) * dt
+    x = np.cumsum(vx * np.cos(heading) - vy * np.sin(heading)) * dt
+    y = np.cumsum(vx * np.sin(heading) + vy * np.cos(heading)) * dt
+    back = rng.choice([-1.0, 1.0], 4) if seed % 2 else np.ones(4)
+    forward = np.column_stack([vx - vy - ARM * turn, vx + vy + ARM * turn, vx + vy - ARM * turn, vx - vy + ARM * turn])
+    speed = back * [-1.0, 1.0, -1.0, 1.0] * forward / RADIUS
+    counts = np.round(np.cumsum(speed, axis=0) * dt * GEAR * COUNTS / (2.0 * np.pi))
+    noise = 10.0 ** rng.uniform(-1.0, 0.7)
+    pose = np.column_stack([x, y, heading]) + noise * rng.normal(size=(len(t), 3)) * [0.002, 0.002, 0.01]
+    shown = np.column_stack([t, pose, counts])[::every]
+    names = "t_s,x_m,y_m,heading_rad,enc1,enc2,enc3,enc4"
+    if glitches:  # a speed in a unit of its own, with spikes
+        spikes = 300.0 * (rng.random((len(shown), 4)) < 0.02)
+        shown, names = np.column_stack([shown, 0.3 * speed[::every] + spikes]), names + ",w1,w2,w3,w4"
+    np.savetxt(path, shown, "%.6f", ",", header=names, comments="")
+    return back
+
+
+@pytest.mark.parametrize("glitches", [False, True])
+@pytest.mark.parametrize("seed", range(10))
+def test_counts_at_the_motor_and_cameras_show_radius_and_arm(tmp_path, seed, glitches):
+    back = camera_log(tmp_path / "log.csv", seed, glitches)
+    options = LogOptions(assume={"a": f"ticks/{COUNTS}@motor"}, gear_ratio=GEAR)
+    seen = wheel_geometry([load_log(tmp_path / "log.csv", options=options).to_run()])
+    assert seen.source == "pose and wheel_angle"
+    assert turned_wheels(seen) == tuple(np.flatnonzero(back < 0.0) + 1)
+    wheels = as_mecanum(seen)
+    assert 1.0 / wheels.per_metre == pytest.approx(RADIUS, rel=0.01)
+    assert wheels.robot_radius == pytest.approx(ARM, rel=0.03)

@@ -16,7 +16,7 @@ from omnidyn.cli.terminal.sizes import LEAST_WHEELS, MOST_WHEELS, refuse_sizes
 from omnidyn.cli.terminal.streams import say
 from omnidyn.errors import InputError
 from omnidyn.logs.columns.mapping import component_channel
-from omnidyn.logs.geometry import Geometry, as_mecanum, wheel_geometry
+from omnidyn.logs.geometry import Geometry, as_mecanum, turned_wheels, wheel_geometry
 from omnidyn.logs.read_log import LogOptions
 from omnidyn.model.first_guess import (
     DIRECTION,
@@ -308,6 +308,11 @@ def from_logs(values: dict[str, Any], log: list[str], options: LogOptions, mecan
     verb = "pushing towards" if mecanum else "at"
     remark = f"from {geometry.source} ({geometry.residual:.1%} unexplained)"
     say(f"omnidyn: wheels {verb} {number_words(tuple(azimuth))} degrees, {remark}")
+    counted_back = turned_wheels(geometry) if mecanum else ()
+    if counted_back:
+        letter = "a" if geometry.wheels == "wheel_angle" else "w"
+        options_of_all = " ".join(f"--column {letter}{k}=-NAME" for k in counted_back)
+        say(f"omnidyn: wheels {number_words(counted_back)} count clockwise: turned; say {options_of_all} elsewhere")
     if mecanum:
         geometry = as_mecanum(geometry)
     elif values["azimuth"] is None and values["wheels"] in (None, len(azimuth)):

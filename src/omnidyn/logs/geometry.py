@@ -5,6 +5,8 @@ Eq (3), G of an omni wheel at azimuth phi, with s = 1/r for speeds behind the ge
     w_i = s (-sin phi_i v_x + cos phi_i v_y + b omega)
 
 is linear in (-s sin phi_i, s cos phi_i, s b): least squares per wheel gives phi_i, s and, where the robot turned, b.
+Beside a pose, whose noise is that of a camera, the twist is fitted to the wheels instead, and that is solved for them:
+noise in what a fit takes for exact makes its numbers small.
 """
 
 from __future__ import annotations
@@ -34,6 +36,14 @@ SOURCES = (
     ("pose", "wheel_speed"),
     ("pose", "wheel_angle"),
 )
+WINDOWS = (
+    0.4,
+    0.8,
+    1.6,
+    3.2,
+)  # [s] over which ways are compared: noise of a pose asks for long ones, turns for short ones
+LEAST_WINDOWS = 20
+AT_EDGE = 0.25  # of a window: over so much before and behind its edge the place there is a mean
 TOGETHER = 0.5  # of the samples of the wheels that stand in a row with one of the body: then rows are compared
 
 
@@ -45,7 +55,8 @@ class Geometry:
     speed [rad/m]: 1/r behind the gear, l/r at the motor. robot_radius [m]: None where the robot never turned.
     residual: rms of what the fit leaves over rms of the wheel speeds. source: which channels it is from. measured:
     whether they were measured, and not commanded. at_motor: whether the log says that the speeds are those of the motor
-    shaft, and nobody which gear is behind it.
+    shaft, and nobody which gear is behind it. arms: b of each wheel, below 0 where one counts clockwise; () where
+    robot_radius is None.
     """
 
     azimuth_deg: tuple[float, ...]
@@ -56,6 +67,7 @@ class Geometry:
     source: str
     measured: bool = False
     at_motor: bool = False
+    arms: tuple[float, ...] = ()
 
     @property
     def wheels(self) -> str:
@@ -66,22 +78,22 @@ class Geometry:
 def wheel_geometry(runs: Sequence[Run], instead: str = "`azimuth`") -> Geometry:
     """Fit the geometry to commands of body and wheels where both are logged, else to what was measured.
 
-    Each channel by its own clock. instead: what says what these logs cannot; of mecanum wheels the radius, for where
-    they stand is known.
+    Of measured channels those count that leave least unexplained. Each channel by its own clock. instead: what says
+    what these logs cannot; of mecanum wheels the radius, for where they stand is known.
     Raises InputError where no run has such a pair of channels or wheels do not follow an omni wheel's law, and
     InsufficientDataError where the runs go in one direction only.
     """
     first: InputError | InsufficientDataError | None = None
+    fits: list[Geometry] = []
     for body, wheels in SOURCES:
-        usable = [_moving(*_compared(run, body, wheels)) for run in runs if _has_both(run, body, wheels)]
-        usable = [pair for pair in usable if len(pair[0])]
-        if not usable:
-            continue
-        twist, speed = (np.concatenate(parts) for parts in zip(*usable, strict=True))
         try:
-            return _fit(twist, speed, f"{body} and {wheels}", instead)
+            fits += _fits(runs, body, wheels, instead)
         except (InputError, InsufficientDataError) as error:
             first = first or error
+        if fits and not fits[0].measured:
+            return fits[0]
+    if fits:
+        return min(fits, key=lambda fit: fit.residual)
     raise first or InputError(
         "cannot tell where the wheels stand",
         got=", ".join(runs[0].channels) if runs else "no log",
@@ -89,6 +101,30 @@ def wheel_geometry(runs: Sequence[Run], instead: str = "`azimuth`") -> Geometry:
         "components of them",
         remedy=f"say which columns they are (`column` w1=NAME), or leave the logs out and give {instead}",
     )
+
+
+def _fits(runs: Sequence[Run], body: str, wheels: str, instead: str) -> list[Geometry]:
+    """The geometry by two channels, over the windows that tell it best; [] where no run has both."""
+    runs = [run for run in runs if _has_both(run, body, wheels)]
+    best: tuple[float, Geometry] | None = None
+    first: InputError | InsufficientDataError | None = None
+    for window in WINDOWS:
+        usable = [_moving(*_compared(run, body, wheels, window)) for run in runs]
+        usable = [pair for pair in usable if len(pair[0])]
+        count = sum(len(twist) for twist, _ in usable)
+        if not usable or (window > WINDOWS[0] and count < LEAST_WINDOWS):
+            break
+        twist, speed = (np.concatenate(parts) for parts in zip(*usable, strict=True))
+        try:
+            fit = _fit(twist, speed, f"{body} and {wheels}", instead)
+        except (InputError, InsufficientDataError) as error:
+            first = first or error
+            continue
+        if best is None or fit.residual / np.sqrt(count) < best[0]:
+            best = float(fit.residual / np.sqrt(count)), fit
+    if best is None and first is not None:
+        raise first
+    return [] if best is None else [best[1]]
 
 
 def shows_both(run: Run) -> bool:
@@ -100,7 +136,7 @@ def _has_both(run: Run, body: str, wheels: str) -> bool:
     return getattr(run, body) is not None and getattr(run, wheels) is not None
 
 
-def _compared(run: Run, body: str, wheels: str) -> tuple[FloatArray, FloatArray]:
+def _compared(run: Run, body: str, wheels: str, window: float) -> tuple[FloatArray, FloatArray]:
     """(twist, wheel speeds): row by row where they share rows, else means over windows. Shapes (n, 3), (n, wheels)."""
     if (body, wheels) in SOURCES[:2]:
         twist, speed = getattr(run, body), getattr(run, wheels)
@@ -109,18 +145,22 @@ def _compared(run: Run, body: str, wheels: str) -> tuple[FloatArray, FloatArray]
         keep = np.isfinite(twist).all(axis=1) & np.isfinite(speed).all(axis=1)
         if keep.sum() > TOGETHER * min(len(sampled(twist)), len(sampled(speed))):
             return twist[keep], speed[keep]
-    return mean_speeds(run, body, wheels)
+    return mean_speeds(run, body, wheels, window)
 
 
 def as_mecanum(geometry: Geometry) -> Geometry:
     """The same wheels as mecanum wheels with rollers at 45 degrees: front left, front right, rear left, rear right.
 
     Every wheel counts counter-clockwise about the robot, those on the left backward: w_i = (-+ v_x +- v_y + b omega)/r
-    is an omni wheel's law with sqrt(2)/r for 1/r and b/sqrt(2) for b, b being half track + half wheelbase. Raises
+    is an omni wheel's law with sqrt(2)/r for 1/r and b/sqrt(2) for b, b being half track + half wheelbase. Wheels that
+    count the other way are turned. Raises
     InputError where they do not push in these directions.
     """
-    angle = [round(azimuth, 1) for azimuth in geometry.azimuth_deg]
-    off = [(azimuth - expected + 180.0) % 360.0 - 180.0 for azimuth, expected in zip(angle, AS_OMNI, strict=False)]
+    counted_back = turned_wheels(geometry)
+    angle = [
+        round((azimuth + 180.0 * (k + 1 in counted_back)) % 360.0, 1) for k, azimuth in enumerate(geometry.azimuth_deg)
+    ]
+    off = _off(angle)
     if len(angle) != len(AS_OMNI) or max(map(abs, off)) > MAX_TURNED:
         raise InputError(
             "the wheels do not push as mecanum wheels in an X do",
@@ -128,10 +168,27 @@ def as_mecanum(geometry: Geometry) -> Geometry:
             expected=f"{list(AS_OMNI)}: front left, front right, rear left, rear right, counter-clockwise positive",
             remedy="name the columns in this order, a left wheel that counts forward with a minus: `column` w1=-LEFT",
         )
-    radius = None if geometry.robot_radius is None else float(np.sqrt(2.0)) * geometry.robot_radius
+    arms = [-arm if k + 1 in counted_back else arm for k, arm in enumerate(geometry.arms)]
+    radius = float(np.sqrt(2.0) * np.mean(arms)) if arms else None
     return replace(
         geometry, azimuth_deg=AS_OMNI, per_metre=geometry.per_metre / float(np.sqrt(2.0)), robot_radius=radius
     )
+
+
+def turned_wheels(geometry: Geometry) -> tuple[int, ...]:
+    """The wheels, from 1, that count clockwise about the robot: their speed falls where it turns counter-clockwise.
+
+    None where all do: then it is the heading that counts the other way.
+    """
+    counted_back = tuple(k + 1 for k, arm in enumerate(geometry.arms) if arm < 0.0)
+    return (
+        counted_back if len(counted_back) < len(geometry.arms) or max(map(abs, _off(geometry.azimuth_deg))) > 90 else ()
+    )
+
+
+def _off(angle: Sequence[float]) -> list[float]:
+    """How far wheels are from where mecanum wheels seem to stand [degree]."""
+    return [(azimuth - expected + 180.0) % 360.0 - 180.0 for azimuth, expected in zip(angle, AS_OMNI, strict=False)]
 
 
 def _moving(twist: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -151,7 +208,7 @@ def _fit(twist: FloatArray, speed: FloatArray, source: str, instead: str) -> Geo
             expected="motion along x and along y",
             remedy=f"add logs in other directions, or leave the logs out and give {instead}",
         )
-    rows, *_ = np.linalg.lstsq(design, speed, rcond=None)
+    rows = _rows(design, speed, source.startswith("pose"))
     rest = speed - design @ rows
     residual = float(np.sqrt(np.mean(rest**2) / np.mean(speed**2)))
     if residual > MAX_RESIDUAL:
@@ -177,22 +234,36 @@ def _fit(twist: FloatArray, speed: FloatArray, source: str, instead: str) -> Geo
         azimuth_std=tuple(np.degrees(spread).tolist()),
         per_metre=float(np.mean(scale)),
         robot_radius=float(np.mean(rows[2] / scale)) if turned else None,
+        arms=tuple((rows[2] / scale).tolist()) if turned else (),
         residual=residual,
         source=source,
         measured=source != " and ".join(COMMANDS),
     )
 
 
+def _rows(twist: FloatArray, speed: FloatArray, of_wheels: bool) -> FloatArray:
+    """The wheel speeds of each axis of the twist, shape (axes, wheels), by least squares.
+
+    of_wheels: the twist is fitted to the wheels, along the directions in which they turn together, and that is solved.
+    """
+    if of_wheels and speed.shape[1] >= twist.shape[1]:
+        *_, together = np.linalg.svd(speed, full_matrices=False)
+        together = together[: twist.shape[1]]
+        way, *_ = np.linalg.lstsq(speed @ together.T, twist, rcond=None)
+        if np.linalg.cond(way) < 1.0 / np.finfo(float).eps:
+            return np.asarray(np.linalg.inv(way) @ together, dtype=float)
+    return np.asarray(np.linalg.lstsq(twist, speed, rcond=None)[0], dtype=float)
+
+
 # How far the body and the wheels went in windows of time, each by the samples of its own sensor
 #
 # Distances add up whatever the sensors' stamps, rates and jitter are: nothing has to be measured at one time.
 
-WINDOW = 0.4  # [s]
 STEPS = 4.0  # steps of the slowest sensor that a window lasts at least
 SPEEDS = ("twist", "wheel_speed")  # the others are positions
 
 
-def mean_speeds(run: Run, body: str, wheels: str) -> tuple[FloatArray, FloatArray]:
+def mean_speeds(run: Run, body: str, wheels: str, window: float = WINDOWS[0]) -> tuple[FloatArray, FloatArray]:
     """(twist of the body, speeds of the wheels), means over windows; shapes (windows, 3) and (windows, wheels).
 
     body: "twist" or "pose". wheels: "wheel_speed" or "wheel_angle". Windows that a sensor was out in are left out; a
@@ -201,10 +272,11 @@ def mean_speeds(run: Run, body: str, wheels: str) -> tuple[FloatArray, FloatArra
     tracks = [*_body_tracks(run, body), *_tracks(*run.samples(wheels), wheels in SPEEDS)]
     if len(tracks) < 4 or min(len(t) for t, _ in tracks) < 3:
         return np.zeros((0, 3)), np.zeros((0, max(len(tracks) - 3, 0)))
-    longest = max(WINDOW, STEPS * max(usual_step(t) for t, _ in tracks))
+    longest = max(window, STEPS * max(usual_step(t) for t, _ in tracks))
     first, last = max(t[0] for t, _ in tracks), min(t[-1] for t, _ in tracks)
-    edges = np.arange(first, last, longest)
-    ways = np.column_stack([_between(t, way, edges) for t, way in tracks]) / longest
+    half = AT_EDGE * longest
+    edges = np.arange(first + half, last - half, longest)
+    ways = np.column_stack([_between(t, way, edges, half) for t, way in tracks]) / longest
     ways = ways[np.isfinite(ways).all(axis=1)]
     return ways[:, :3], ways[:, 3:]
 
@@ -243,11 +315,21 @@ def _body_tracks(run: Run, body: str) -> list[Track]:
     return [(t, np.real(way)), (t, np.imag(way)), (t, heading)]
 
 
-def _between(t: FloatArray, way: FloatArray, edges: FloatArray) -> FloatArray:
-    """How far a component went from each edge to the next, shape (edges - 1,); NaN across a gap of its samples."""
-    distances = np.diff(np.interp(edges, t, way))
+def _between(t: FloatArray, way: FloatArray, edges: FloatArray, half: float) -> FloatArray:
+    """How far a component went from each edge to the next, shape (edges - 1,); NaN across a gap of its samples.
+
+    Where it was at an edge is a mean over `half` [s] before and behind it, the same for body and wheels.
+    """
+    distances = np.diff(_integral(t, way, edges + half) - _integral(t, way, edges - half)) / (2.0 * half)
     gaps = np.append(0, np.cumsum(np.diff(t) > GAP * usual_step(t)))
-    after = np.clip(np.searchsorted(t, edges[1:]), 0, len(t) - 1)
-    before = np.clip(np.searchsorted(t, edges[:-1], side="right") - 1, 0, len(t) - 1)
+    after = np.clip(np.searchsorted(t, edges[1:] + half), 0, len(t) - 1)
+    before = np.clip(np.searchsorted(t, edges[:-1] - half, side="right") - 1, 0, len(t) - 1)
     crossed = gaps[after] - gaps[before]
     return np.where(crossed > 0, np.nan, distances)
+
+
+def _integral(t: FloatArray, values: FloatArray, ends: FloatArray) -> FloatArray:
+    """The integral from the first sample to each end, straight between samples. Shape of `ends`."""
+    whole = np.append(0.0, np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(t)))
+    k = np.clip(np.searchsorted(t, ends, side="right") - 1, 0, len(t) - 2)
+    return whole[k] + 0.5 * (values[k] + np.interp(ends, t, values)) * (ends - t[k])

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import omnidyn
 from omnidyn.logs.columns.guess import guess_columns
+from omnidyn.logs.log import Log
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot_file import load_robot
 from tests.support.bags import BagMaker, write_mcap
@@ -138,3 +139,43 @@ def test_a_message_of_a_battery_in_millivolts_is_asked_about(tmp_path):
             assert any("12600 V is no supply of a robot" in words for words in said(run.warnings))
             again = omnidyn.read_log(path, assume={"supply": "mV"})
             assert again.supply[-1] == pytest.approx(12.6)
+
+
+# Units that a name does not say: right, asked about, or named by check; asked rarely where a name says them
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_voltage_is_wrong_in_silence(seed):
+    """A battery or motors in volts, millivolts, hundredths, or steps of a converter of 10 or 12 bits."""
+    rng, asked = np.random.default_rng(seed), 0
+    for _ in range(200):
+        cells, sag = rng.integers(2, 13), 0.1 * rng.random(ROWS)
+        name, component = [("battery", "supply"), ("voltage", "u1"), ("vbat", "supply")][rng.integers(3)]
+        volts = 3.7 * cells * (1.0 - sag) * (SWING if component == "u1" else 1.0)
+        per_volt = [1.0, 1000.0, 100.0, 1023.0 / 55.0, 4095.0 / 55.0][kind := rng.integers(5)]
+        columns = guessed({name: np.round(volts * per_volt, 2)})
+        if component in columns.columns:
+            unit = columns.columns[component].unit
+            size = {"V": 1.0, "mV": 1e-3, "cV": 1e-2}[unit]
+            assert size * per_volt == pytest.approx(1.0) or np.abs(volts * per_volt).max() < 100.0, (name, kind, cells)
+        else:
+            assert [doubt.components for doubt in columns.doubts] == [(component,)]
+        unit = ["V", "mV", "cV"][rng.integers(3)]
+        said_unit = guessed({f"{name}_{unit}": volts / {"V": 1.0, "mV": 1e-3, "cV": 1e-2}[unit]})
+        asked += component not in said_unit.columns
+    assert asked <= 10
+
+
+@pytest.mark.parametrize("unit", ["rad", "deg", "turns"])
+@pytest.mark.parametrize("seed", range(6))
+def test_an_angle_in_another_unit_is_named_beside_its_speed(unit, seed):
+    rng, rows = np.random.default_rng(seed), 1500
+    step = 10.0 ** rng.uniform(-3.0, -1.8)  # slower rows turn by more than pi in degrees: taken for a wrap
+    rate = rng.uniform(0.5, 2.0) * np.sin(np.linspace(0.0, 40.0, rows) * rng.uniform(0.5, 1.0))
+    turned = np.cumsum(rate) * step + 0.001 * rng.normal(size=rows)
+    factor = {"rad": 1.0, "deg": 180.0 / np.pi, "turns": 1.0 / (2.0 * np.pi)}[unit]
+    channels = {"twist": np.column_stack([0.2 * rate, 0.0 * rate, rate]), "pose": np.zeros((rows, 3))}
+    channels["pose"][:, 2] = turned * factor
+    verdict = omnidyn.check(Log(np.arange(rows) * step, channels, np.arange(rows) + 2))
+    codes = {finding.code for finding in verdict.findings if "heading" in finding.subject or "omega" in finding.subject}
+    assert bool(codes & {"unit", "scale", "time_unit"}) == (unit != "rad")
