@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.motors import choice
 from omnidyn.identification.motors.choice import WAYS, choose_motor, fit_rmse, run_motor
-from omnidyn.identification.motors.fit import fit_motor
+from omnidyn.identification.motors.fit import fit_motor, fit_ways
 from omnidyn.identification.motors.log import HOLD
 from omnidyn.identification.motors.problem import step_numbers
 from omnidyn.run import Run
@@ -106,10 +107,27 @@ def test_a_true_way_is_as_sure_as_before(clean):
 def test_the_way_chosen_by_logs_left_out_is_the_true_one(clean, band):
     """Held inputs, no latency; a dead band only where there is one. One log is predicted by its parts."""
     for runs in (run_of(clean, band, 2), [run_of(clean, band, seed) for seed in range(2)]):
-        choice = choose_motor(runs)
-        assert choice.way == {"between": "hold", "latency": False, "dead_band": band > 0.0}
-        assert len(choice.errors) == len(WAYS)
-        assert min(error for _, error in choice.errors) == pytest.approx(0.05, rel=0.15)  # the noise
+        chosen = choose_motor(runs)
+        assert chosen.way == {"between": "hold", "latency": False, "dead_band": band > 0.0}
+        assert len(chosen.errors) == len(WAYS)
+        assert min(error for _, error in chosen.errors) == pytest.approx(0.05, rel=0.15)  # the noise
+
+
+def test_ways_that_differ_between_rows_alone_share_their_fits(clean, monkeypatch):
+    """Each fit is made in all of them anyway: a fit for each part of a log, not for each part and way."""
+    asked = []
+
+    def counted(runs, motor, **options):
+        asked.append(options)
+        return fit_ways(runs, motor, **options)
+
+    monkeypatch.setattr(choice, "fit_ways", counted)
+    (first, *_), run = WAYS, run_of(clean, 0.0, 2)
+    ways = [way for way in WAYS if (way["latency"], way["dead_band"]) == (first["latency"], first["dead_band"])]
+    found = choose_motor(run, ways=ways)
+    assert [way["between"] for way in ways] == ["hold", "mean", "curve"]
+    assert len({error for _, error in found.errors}) == 3
+    assert asked == [{"latency": False, "dead_band": False}] * choice.SHARES
 
 
 def test_a_choice_needs_logs_that_can_be_predicted(clean):

@@ -11,8 +11,9 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError, OmnidynError
+from omnidyn.identification.methods import AUTO
 from omnidyn.identification.motors.estimate import BAND, OFFSET, MotorEstimate
-from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
+from omnidyn.identification.motors.fit import MotorFits, fit_motor, fit_ways, logs_of_free_runs
 from omnidyn.identification.motors.log import CURVE, HOLD, MEAN, SUB
 from omnidyn.identification.motors.problem import SPEED, MotorEngine, motor_problem, motor_record
 from omnidyn.identification.output_error.problem.record import SHORTEST
@@ -96,7 +97,8 @@ def choose_motor(
     Raises InsufficientDataError where no way could be tried, and what `fit_motor` raises.
     """
     logs = as_list(runs)
-    errors = tuple((way, _left_out(logs, motor, score, {**shared, **way})) for way in ways)
+    left_out = _LeftOut(logs, motor, score)
+    errors = tuple((way, left_out.error({**shared, **way})) for way in ways)
     best: tuple[Way, float] | None = None
     for way, error in errors:
         if np.isfinite(error) and (best is None or error < (1.0 - TIE) * best[1]):
@@ -108,14 +110,31 @@ def choose_motor(
     return MotorChoice(best[0], fit_motor(logs, motor, **{**shared, **best[0]}), errors)
 
 
-def _left_out(runs: Sequence[Run], motor: int, score: Score, fit_options: Mapping[str, Any]) -> float:
-    errors = []
-    for fitted_runs, left_out_run in _folds(runs):
+class _LeftOut:
+    """Errors on logs left out. Ways that follow one another and differ in `between` alone share their fits."""
+
+    def __init__(self, runs: Sequence[Run], motor: int, score: Score):
+        self.folds, self.motor, self.score = list(_folds(runs)), motor, score
+        self.options: Mapping[str, Any] | None = None
+        self.fits: list[MotorFits] = []
+
+    def error(self, fit_options: Mapping[str, Any]) -> float:
+        """Root mean square of the scores of all folds, infinite where a fit was not possible."""
+        options = {name: value for name, value in fit_options.items() if name != "between"}
+        between = fit_options.get("between", AUTO)
         try:
-            errors.append(score(fit_motor(fitted_runs, motor, **fit_options), [left_out_run]))
+            if options != self.options:
+                self.options, self.fits = options, []
+                self.fits = [fit_ways(fitted_runs, self.motor, **options) for fitted_runs, _ in self.folds]
+            if not self.fits:  # the fit before, with the same options, was not possible
+                return float("inf")
+            errors = [
+                self.score(fits.estimate(between), [left_out_run])
+                for fits, (_, left_out_run) in zip(self.fits, self.folds, strict=True)
+            ]
         except OmnidynError:
             return float("inf")
-    return float(np.sqrt(np.mean(np.square(errors))))
+        return float(np.sqrt(np.mean(np.square(errors))))
 
 
 def _folds(runs: Sequence[Run]) -> Iterator[tuple[list[Run], Run]]:

@@ -91,9 +91,67 @@ def fit_motor(
     of a few lags and of the line through windows.
     Raises InputError for a run without the channels, InsufficientDataError where the motor says nothing.
     """
+    _check_between(between)
+    return fit_ways(
+        runs, motor, dead_band=dead_band, offset=offset, kind=kind, latency=latency, angle=angle, loss=loss, start=start
+    ).estimate(between)
+
+
+def _check_between(between: str) -> None:
     if between not in (AUTO, *WORDS):
         expected = f"{AUTO}, {', '.join(WORDS)}"
         raise InputError("no such way", got=between, expected=expected, where="between")
+
+
+@dataclass(frozen=True, eq=False)
+class MotorFits:
+    """The fits of one motor in each way that an input may hold between rows; `estimate` says what one of them means."""
+
+    logs: Sequence[MotorLog]
+    motor: int
+    fit_by_way: Mapping[str, tuple[Solver[MotorProblem], Solution]]
+    trust_by_way: Mapping[str, Trust]
+    resting_input: float
+
+    def estimate(self, between: str) -> MotorEstimate:
+        """The fit in one of `WORDS`, or in that which fits best ("auto"), with what the others say beside it."""
+        _check_between(between)
+        logs, motor = self.logs, self.motor
+        answers = {
+            way: _answer(*pair, self.trust_by_way[way], logs, motor, way) for way, pair in self.fit_by_way.items()
+        }
+        cost = {way: end.state.objective for way, (_, end) in self.fit_by_way.items()}
+        best_way = between if between != AUTO else min(cost, key=lambda way: cost[way])
+        fit = answers[best_way]
+        # coloured residuals make every likelihood too steep
+        rise = RISE * max(self.trust_by_way[best_way].widening, 1.0) ** 2
+        for way in cost:
+            if way != best_way and 2.0 * (cost[way] - cost[best_way]) <= rise:
+                fit = _with_rival(fit, answers[way])
+        if fit.dead_band_seen:
+            solver, solution = self.fit_by_way[best_way]
+            fit = _with_bend(fit, bend(solver, solution.state))
+        fit = fit.bounded(turned_under(logs, motor, way=orientation_of(logs, motor)), self.resting_input)
+        if BAND not in fit.unidentifiable:
+            return fit
+        low, high = slope_between(logs, motor, fit.ci95[BAND])  # both go together
+        least, most = fit.ci95[SLOPE]
+        return replace(fit, ci95={**fit.ci95, SLOPE: (min(least, low), max(most, high))})
+
+
+def fit_ways(
+    runs: Run | Sequence[Run],
+    motor: int = 0,
+    *,
+    dead_band: bool = True,
+    offset: bool = False,
+    kind: str = "",
+    latency: bool = False,
+    angle: bool = False,
+    loss: str = GAUSS,
+    start: Mapping[str, float] | None = None,
+) -> MotorFits:
+    """Fit one motor in all ways that an input may hold between rows; arguments and refusals as of `fit_motor`."""
     if loss not in (GAUSS, STUDENT):
         raise InputError("unknown loss", got=loss, expected=f"{GAUSS} or {STUDENT}", where="loss")
     logs = logs_of_free_runs(runs, kind)
@@ -103,27 +161,12 @@ def fit_motor(
         problem = motor_problem([motor_record(log, motor, way, angle) for log in logs], dead_band, latency, offset)
         solution = solved(problem, degrees(loss), line, start is None)
         fit_by_way[way] = solution.solver, solution
-    cost = {way: end.state.objective for way, (_, end) in fit_by_way.items()}
-    best_way = between if between != AUTO else min(cost, key=lambda way: cost[way])
     # rows of a refined log have no measured neighbours, so that auto would not see whether these resemble
     resting_input = rested_under(logs, motor)
     trust_by_way = {
         way: _trusted(*pair, SANDWICH if way == CURVE else AUTO, resting_input) for way, pair in fit_by_way.items()
     }
-    answers = {way: _answer(*pair, trust_by_way[way], logs, motor, way) for way, pair in fit_by_way.items()}
-    fit = answers[best_way]
-    rise = RISE * max(trust_by_way[best_way].widening, 1.0) ** 2  # coloured residuals make every likelihood too steep
-    for way in cost:
-        if way != best_way and 2.0 * (cost[way] - cost[best_way]) <= rise:
-            fit = _with_rival(fit, answers[way])
-    if fit.dead_band_seen:
-        fit = _with_bend(fit, bend(fit_by_way[best_way][0], fit_by_way[best_way][1].state))
-    fit = fit.bounded(turned_under(logs, motor, way=orientation_of(logs, motor)), resting_input)
-    if BAND not in fit.unidentifiable:
-        return fit
-    low, high = slope_between(logs, motor, fit.ci95[BAND])  # both go together
-    least, most = fit.ci95[SLOPE]
-    return replace(fit, ci95={**fit.ci95, SLOPE: (min(least, low), max(most, high))})
+    return MotorFits(logs, motor, fit_by_way, trust_by_way, resting_input)
 
 
 def solved(
