@@ -7,7 +7,9 @@ import re
 from pathlib import Path
 
 IDENTIFICATION = Path(__file__).resolve().parents[2] / "src" / "omnidyn" / "identification"
-RULE = re.compile(r"std\(ddof=1\)\)? \* np\.sqrt\(len\(|^(PAYS|TIE|\w*(GAIN|BETTER|LOSS|SHAPE)_ERRORS) = ", re.MULTILINE)
+RULE = re.compile(
+    r"std\(ddof=1\)\)? \* np\.sqrt\(len\(|^(PAYS|TIE|\w*(GAIN|BETTER|LOSS|SHAPE)_ERRORS) = ", re.MULTILINE
+)
 OTHER_QUESTIONS = {"output_error/problem/nuisances.py"}
 
 # What still has a rule of its own. What asks `compare_blocks` by now must go from this list.

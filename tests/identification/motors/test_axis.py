@@ -1,6 +1,6 @@
 """A linear axis with position and force, one stretch of whose log is wrong, made by a loop of its own in small steps.
 
-M x'' = F - offset - viscous x' - coulomb sgn x', the numbers of a drive of 95 kg; a controller follows random positions.
+M x'' = F - offset - viscous x' - coulomb sgn x', for a mass of 95 kg; a controller follows random positions.
 """
 
 import numpy as np

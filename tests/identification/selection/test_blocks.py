@@ -102,6 +102,7 @@ def test_an_effect_is_found_more_often_than_by_signs():
 
 def test_an_effect_is_found_beside_a_block_that_rules_the_sum():
     """More than twice as often as by the sum of squares and two of its standard errors."""
+
     def by_sums(without, with_effect):
         gain = without - with_effect
         return gain.sum() > 2.0 * gain.std(ddof=1) * np.sqrt(len(gain))
