@@ -1,6 +1,6 @@
-"""One rule says whether a model predicts held-out blocks better, `compare_blocks`; files that have another may only fall.
+"""Whether a model predicts held-out blocks better, `compare_blocks` says; files with another rule may only get fewer.
 
-Another rule is the standard error of a sum over blocks, or a constant: a share or standard errors by which one must win.
+Another rule is the standard error of a sum over blocks, or a share or standard errors by which a model must win.
 """
 
 import re

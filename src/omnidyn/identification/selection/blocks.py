@@ -7,9 +7,9 @@ the errors of block b without and with the effect:
 
 A ratio forgets how large the errors of a block are, and a rank how large the ratio is: no block rules the answer. Of
 models that are fitted to the other blocks a useless number makes most blocks worse, so that an effect passes by chance
-more rarely than LIMIT says. For white noise and one useless number it does in 2 of 100 logs of 10 blocks, in 1 of 100 of
-20. At the same false rate a sign test finds fewer effects: of those that are four standard errors large 44 % of 10
-blocks, this one 68 % (the test of this file measures both).
+more rarely than LIMIT says. For white noise and one useless number it does in 2 of 100 logs of 10 blocks, and in 1 of
+100 of 20. At the same false rate a sign test finds fewer effects: of those that are four standard errors large 44 % of
+10 blocks, this one 68 % (the test of this file measures both).
 """
 
 from __future__ import annotations
