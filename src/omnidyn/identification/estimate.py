@@ -12,6 +12,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Table, interval_cell, plain, sentence
 from omnidyn.errors import shortened
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
+from omnidyn.identification.selection.blocks import BlockComparison
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.first_guess import rests_on as guesses_under
 from omnidyn.model.first_guess import rests_on_guesses
@@ -238,12 +239,13 @@ class HeldOut:
     spread, the geometric mean of all outputs.
 
     written: of what is written. plain: of the plain fit: friction and what else was free, white noise, no nuisances.
-    given: of the robot as it was given; None where nothing was.
+    given: of the robot as it was given; None where nothing was. comparison: of what is written with the plain fit.
     """
 
     written: float
     plain: float
     given: float | None = None
+    comparison: BlockComparison | None = None
 
     def statement(self) -> Statement:
         """What they are."""

@@ -7,7 +7,7 @@ import math
 from omnidyn.document import all_of
 from omnidyn.identification.motors.log import WORDS
 from omnidyn.statement import Statement
-from omnidyn.telling.sentence import Sentence
+from omnidyn.telling.sentence import Sentence, either
 
 NOT_IDENTIFIABLE = "dead band not identifiable here"
 NOT_WRITTEN = {
@@ -66,6 +66,8 @@ def _held_out_blocks(statement: Statement) -> str:
     written, plain = (f"{numbers[name]:.2%}" for name in ("written", "plain"))
     words = f"{statement.subject}: on held-out blocks its free run misses {written} of the spread of what was measured"
     words += f", that of slope and lag alone {plain}"
+    if "blocks" in numbers:
+        words += f"; {numbers['better']} of {numbers['blocks']} blocks are predicted better"
     names = [name.replace("_", " ") for name in numbers["rejected"]]
     return f"{words}; {all_of(names)} {'is' if len(names) == 1 else 'are'} no help and not kept" if names else words
 
@@ -258,7 +260,12 @@ SENTENCES = {
     ),
     "motor_held_out_blocks": Sentence(_held_out_blocks),
     "dead_band_rejected": Sentence(
-        "no dead band is kept: held-out blocks are predicted as well without; it is at most {high:.3g} {unit}"
+        either(
+            "blocks",
+            "no dead band is kept: {better} of {blocks} held-out blocks are predicted better with one, no more than by "
+            "chance; it is at most {high:.3g} {unit}",
+            "no dead band is kept: held-out blocks are predicted as well without; it is at most {high:.3g} {unit}",
+        )
     ),
     "offset_as_friction": Sentence(_offset_as_friction),
     "offset_of_input": Sentence(_offset_of_input),

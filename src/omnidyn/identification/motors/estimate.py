@@ -15,6 +15,7 @@ from typing import Any
 from omnidyn.arrays import FloatArray
 from omnidyn.document import plain
 from omnidyn.identification.estimate import HeldOut
+from omnidyn.identification.selection.blocks import BlockComparison
 from omnidyn.statement import NOTE, WARNING, Statement
 
 SLOPE, BAND, OFFSET, LAG, INERTIA, LATENCY = "slope", "dead_band", "offset", "lag", "inertia", "latency"
@@ -51,7 +52,7 @@ class MotorEstimate:
     does not resolve the input there. one_way: it turned one way only, so a dead band and an offset of the input are
     one. held_out [rad/s]: error of free runs on logs that were not fitted. source: the logs. answers: whether its
     speed goes with its input. travel: "rad", or "m" of a linear axis: what stands here in rad is in that.
-    rejected: numbers that held-out blocks do not need, with their intervals.
+    rejected: numbers that held-out blocks do not need, with their intervals; comparisons: of them, by these blocks.
     Of windows: rest, the largest input under which the motor stayed at rest, NaN where it never rested; draws: of the
     bootstrap, by name. Of a free run: between, noise by channel, kind of the covariance, whether the fit converged.
     """
@@ -82,6 +83,7 @@ class MotorEstimate:
     answers: bool = True
     blocks: HeldOut | None = None
     rejected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    comparisons: Mapping[str, BlockComparison] = field(default_factory=dict)
     travel: str = "rad"
 
     @property
@@ -162,6 +164,8 @@ class MotorEstimate:
         if self.blocks is None:
             return None
         numbers = {"written": self.blocks.written, "plain": self.blocks.plain, "rejected": tuple(self.rejected)}
+        if comparison := self.blocks.comparison:
+            numbers |= {"better": comparison.better, "blocks": comparison.blocks}
         return Statement("motor_held_out_blocks", NOTE, self.name, numbers)
 
     def late_statements(self, row: float) -> list[Statement]:
@@ -179,7 +183,10 @@ class MotorEstimate:
 
     def _of_dead_band(self, has_start: bool) -> Statement:
         if BAND in self.rejected:
-            return Statement("dead_band_rejected", NOTE, numbers={"high": self.rejected[BAND][1], "unit": self.unit})
+            numbers = {"high": self.rejected[BAND][1], "unit": self.unit, "better": None, "blocks": None}
+            if comparison := self.comparisons.get(BAND):
+                numbers |= {"better": comparison.better, "blocks": comparison.blocks}
+            return Statement("dead_band_rejected", NOTE, numbers=numbers)
         if BAND not in self.value:
             return Statement("dead_band_not_asked", NOTE)
         low, high = self.ci95[BAND]
@@ -238,7 +245,10 @@ class MotorEstimate:
                 "held_out_blocks": None if self.blocks is None else asdict(self.blocks),
             }
         )
-        of_way["rejected"] = {name: {"ci95": ends} for name, ends in self.rejected.items()}
+        of_way["rejected"] = {
+            name: {"ci95": ends} | ({"blocks": asdict(self.comparisons[name])} if name in self.comparisons else {})
+            for name, ends in self.rejected.items()
+        }
         return plain(
             {
                 "motor": "all" if self.motor is None else self.motor + 1,

@@ -2,7 +2,7 @@
 
 The rows are cut into blocks of equal length. A fifth of them at a time has no outputs for a fit, and is predicted by
 its free run, which goes on through them under the input of the log. Of dead band, offset and latency the one is left
-out that held-out rows need least, as long as they do not need it by more than chance.
+out that held-out rows need least, as long as the blocks do not need it by more than chance (`compare_blocks`).
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from omnidyn.identification.motors.windows import line_numbers
 from omnidyn.identification.output_error.problem.nuisances import earliest
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
+from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 
 NUMBERS = (BAND, OFFSET, LATENCY)
 FOLDS, BLOCKS, LEAST_BLOCK = 5, 20, 8  # rows of a block at least
 BLOCK_ITERATIONS = 12  # iterations of a fit without some blocks, which begins at that to all
-GAIN_ERRORS = 2.0  # standard errors of its gain by which a number must pay
 ERROR_LIMIT = 5.0  # scales of the noise that an error counts at most, where it is that of Student's t
 
 
@@ -48,19 +48,21 @@ class MotorModel:
     errors: FloatArray
     size: float
 
-    def pays(self, smaller_model: MotorModel) -> bool:
-        """Whether it predicts held-out rows better than a model with fewer numbers, by more than chance."""
-        gain = smaller_model.errors - self.errors
-        return float(gain.sum()) > GAIN_ERRORS * float(gain.std(ddof=1)) * np.sqrt(len(gain))
+    def beside(self, smaller_model: MotorModel) -> BlockComparison:
+        """How it predicts the held-out blocks beside a model with fewer numbers."""
+        return compare_blocks(smaller_model.errors, self.errors)
 
 
 @dataclass(frozen=True, eq=False)
 class ModelChoice:
-    """model: with the numbers that pay; plain_model: with none of NUMBERS; rejected: those that do not pay."""
+    """model: with the numbers that pay; plain_model: with none of NUMBERS; rejected: those that do not pay.
+
+    comparisons: of those of `rejected` that were plausible, how the model with it did beside that without."""
 
     model: MotorModel
     plain_model: MotorModel
     rejected: tuple[str, ...]
+    comparisons: Mapping[str, BlockComparison]
 
 
 def choose_model(
@@ -83,6 +85,7 @@ def choose_model(
         if candidate_names
         else plain_model
     )
+    comparisons: dict[str, BlockComparison] = {}
     while wanted_names is None and model.names:
         if implausible_names := [name for name in model.names if not held_out.is_plausible(model, name)]:
             model = held_out.model(model.between, _without(model.names, *implausible_names), model.values)
@@ -92,13 +95,16 @@ def choose_model(
             for name in model.names
             for way in (ways if name == LATENCY else [model.between])  # another reading may be as late
         ]
-        best_model = min(smaller_models, key=lambda model_here: model_here.size)
-        if model.pays(best_model):
+        best_model = min(smaller_models, key=lambda smaller_model: smaller_model.size)
+        comparison = model.beside(best_model)
+        if comparison.is_better:
             break
+        comparisons |= dict.fromkeys(_without(model.names, *best_model.names), comparison)
         model = best_model
-    if wanted_names is None and plain_model.size <= model.size:
+    if wanted_names is None and not (comparison := model.beside(plain_model)).is_better:
+        comparisons |= dict.fromkeys(model.names, comparison)
         model = plain_model
-    return ModelChoice(model, plain_model, _without(candidate_names, *model.names))
+    return ModelChoice(model, plain_model, _without(candidate_names, *model.names), comparisons)
 
 
 def _without(names: Sequence[str], *removed_name: str) -> tuple[str, ...]:
@@ -230,10 +236,14 @@ def written_and_plain(logs: Sequence[MotorLog], motor: int, method: MotorFit) ->
     model, plain_model = choice.model, choice.plain_model
     written_fit = fit(model.names, model)
     intervals = {name: _interval(fit((*model.names, name), model), name) for name in choice.rejected}
-    blocks = HeldOut(model.size, plain_model.size)
+    blocks = HeldOut(model.size, plain_model.size, comparison=model.beside(plain_model) if model.names else None)
     latency_notes = tuple(written_fit.late_statements(min(log.step for log in logs)))
     return replace(
-        written_fit, blocks=blocks, rejected=intervals, warnings=(*written_fit.warnings, *latency_notes)
+        written_fit,
+        blocks=blocks,
+        rejected=intervals,
+        comparisons=choice.comparisons,
+        warnings=(*written_fit.warnings, *latency_notes),
     ), fit((), plain_model)
 
 
