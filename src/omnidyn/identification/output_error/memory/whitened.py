@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.output_error.engines.engine import Engine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.outputs import SPEEDS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
@@ -98,6 +99,40 @@ class TangentEngine(Engine[Problem]):
                 (residual - slopes @ np.concatenate([value_changes, state - start_state])[indices], slopes, indices)
             )
         return parts_by_piece
+
+
+class NearEngine(Engine[Problem]):
+    """Shows what `exact_engine` would show near a point, by `fast_engine`, an engine of the same problem, corrected at
+    the point.
+
+    The implicit engine with a step a row is three times as fast as with a tolerance, and what it is off by hardly
+    changes on the way of some standard errors. Residuals and slopes are exact at the point itself. Its kinks are not
+    where those of the dear engine are, which must have the last word.
+    """
+
+    def __init__(self, exact_engine: Engine[Problem], fast_engine: Engine[Problem], point: Point):
+        self.problem, self._cheap = exact_engine.problem, fast_engine
+        pairs = zip(exact_engine.residuals(point), fast_engine.residuals(point), strict=True)
+        self._off = [(np.nan_to_num(a[0] - b[0]), np.nan_to_num(a[1] - b[1])) for a, b in pairs]
+
+    def bent(self, inner: FloatArray, step: FloatArray) -> FloatArray:
+        """A step of a fit as the engine that simulates bends it."""
+        return self._cheap.bent(inner, step)
+
+    def residuals(self, point: Point) -> list[Parts]:
+        """Residuals and slopes of every piece, see engines/engine.py."""
+        parts = zip(self._cheap.residuals(point), self._off, strict=True)
+        return [
+            (residual + residual_change, slopes + extra_slopes, indices)
+            for (residual, slopes, indices), (residual_change, extra_slopes) in parts
+        ]
+
+
+def near(engine: Engine[Problem], point: Point) -> Engine[Problem]:
+    """An engine for a few steps from a point: by a step a row where one with a tolerance simulates, else itself."""
+    if engine.tol is None:
+        return engine
+    return NearEngine(engine, ImplicitEngine.of(engine.problem), point)
 
 
 def moving_rows(piece: Piece, residual: FloatArray) -> BoolArray:

@@ -10,7 +10,7 @@ where the restricted likelihood is largest: its memory is not too short because 
 (D. A. Harville, J. Am. Stat. Assoc. 72, 320 (1977)).
 
 Simulations are dear and memories are not: between two simulations memory and numbers settle in turn on rows that are
-taken as straight, by the residuals and slopes of the last one.
+taken as straight, by the residuals and slopes of the last one. Far from the end, simulations are coarse: `near`.
 
 The covariance is (J~' J~ / s^2)^-1, ~ the filtered rows, and as much wider or narrower as the change of the score
 between the ends of the intervals says: of slow errors only what is fast counts, and there a robot that stops or sets
@@ -40,6 +40,7 @@ from omnidyn.identification.output_error.memory.whitened import (
     WhitenedEngine,
     known_rows,
     moving_rows,
+    near,
     spacing,
 )
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
@@ -113,8 +114,9 @@ def whitened(solution: Solution, uncertainty_before: Trust, progress: Progress =
     for iteration in range(ROUNDS):
         progress(Report(f"errors with a memory, round {iteration + 1}"))
         models, is_far = _straight(solver, point, models), movement > NEARBY_ERRORS
-        precision = EARLY_PRECISION if is_far else LATE_PRECISION
-        new_solution = _filtered(solver, solver.engine.unfiltered, models, precision).minimise(
+        engine = near(solver.engine.unfiltered, point) if is_far else solver.engine.unfiltered
+        precision = LATE_PRECISION if engine is solver.engine.unfiltered else EARLY_PRECISION
+        new_solution = _filtered(solver, engine, models, precision).minimise(
             point, FEW_STEPS, blocked_parameters=None if is_far else blocked_parameters
         )
         movement, point, blocked_parameters = (
