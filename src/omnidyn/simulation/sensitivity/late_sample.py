@@ -289,12 +289,8 @@ def passed_on(ask: FloatArray, dask: FloatArray, dead: float) -> tuple[FloatArra
 
 
 def _within(tol: float | None, numbers: Plant, dt: FloatArray) -> float:
-    return ROUGH_TOLERANCE if tol is None and is_steep(numbers, float(np.median(dt))) else as_tolerance(tol)
-
-
-def is_steep(numbers: Plant, dt: float) -> bool:
-    """Whether friction falls, or is damped, so fast that a row [s] takes more than PIECES steps."""
-    return dt * numbers.body.steep_sum > PIECES * MONOTONE
+    steep = float(np.median(dt)) * numbers.body.steep_sum > PIECES * MONOTONE
+    return ROUGH_TOLERANCE if tol is None and steep else as_tolerance(tol)
 
 
 def looped_samples(

@@ -20,7 +20,7 @@ from tests.support.friction_shapes import implicit
 
 @pytest.fixture(scope="module")
 def guessed(axebot):
-    """What `init` makes of a drawing and a scale, for the engine that is dear: it never reaches its current limit."""
+    """What `init` makes of a drawing and a scale, for the engine that is dear."""
     wheels = axebot.wheels.replace(wheel_radius=0.035, robot_radius=0.1)
     return implicit(with_gear(first_guess("mine", wheels, 1.5, 6.0), 19.0, "", GIVEN))
 
@@ -65,7 +65,7 @@ def test_it_is_the_engine_itself_where_there_is_no_cheaper_one(problem):
 
 
 def test_a_model_that_misses_something_takes_few_dear_marches(log, guessed, monkeypatch):
-    """Errors remember, and bend the likelihood: 31 marches with a tolerance before."""
+    """Errors remember, and bend the likelihood: 32 marches with a tolerance without the cheap one."""
     marched, simulated = Counter(), ImplicitEngine._simulated
 
     def counted(engine, point):
@@ -75,4 +75,4 @@ def test_a_model_that_misses_something_takes_few_dear_marches(log, guessed, monk
     monkeypatch.setattr(ImplicitEngine, "_simulated", counted)
     found = identify(log, guessed, OutputError(nuisances=("latency",), covariance="autoregressive")).estimate
     assert found.converged
-    assert sum(marched.values()) - marched[None] <= 22
+    assert sum(marched.values()) - marched[None] <= 28

@@ -33,8 +33,6 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver, S
 from omnidyn.identification.structure.missing.candidates import CHANGE, Candidate, Fitted, Trial
 from omnidyn.identification.structure.missing.switches import Switch, as_fitted, simpler_first, switches
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
-from omnidyn.model.stick_slip.plant import plant
-from omnidyn.simulation.sensitivity.late_sample import is_steep
 
 BEST = 3  # candidates that are fitted beside the shapes
 FIT_PRECISION = 0.1  # squared standard errors to the best point that are enough to compare
@@ -70,8 +68,7 @@ def refits(
 ) -> dict[str, tuple[Candidate, list[Trial]]]:
     """Key -> a candidate with what a fit with it shows. problem, parts: what was fitted, its rows at the best point.
 
-    ranking: by columns near the fit. Nothing of wheels that slip, nor of friction that takes many steps a row, whose
-    fits take as long as all else.
+    ranking: by columns near the fit. Nothing of wheels that slip, whose fits take as long as all else.
     """
     if problem.robot.wheels.traction_mu is not None:
         return {}
@@ -88,11 +85,8 @@ def refits(
         errors_by_kind = {kind: _by_coarse_steps(problem, parts, point, kind) for kind in kinds}
     except OmnidynError:  # a nuisance that the implicit engine does not know
         return {}
-    row = min(float(np.median(np.diff(piece.record.t))) for piece in problem.pieces)
     for candidate, remedy in _asked(ranking, candidates):
         for way in switches(remedy, problem.robot, _question(problem), solution, moves_priors=True):
-            if is_steep(plant(way.robot), row):
-                continue
             try:
                 begun_fits.append(_begun(candidate, way, problem, solution, errors_by_kind).gone_on(STEPS))
             except OmnidynError:  # no engine simulates it, or nothing is left to be fitted
