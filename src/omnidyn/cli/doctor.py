@@ -94,11 +94,10 @@ def _compiler() -> dict[str, str]:
     """Whether a function can be compiled, for which processor, and in what time."""
     start = time.monotonic()
     try:
-        import numba
-        from llvmlite import binding
+        from omnidyn.compiled.kernel import processor_compiled_for
 
-        right = numba.njit(lambda x: 2.0 * x)(1.0) == 2.0
-        words = f"{binding.get_host_cpu_name()}, one function in {time.monotonic() - start:.1f} s"
+        right, processor = processor_compiled_for()
+        words = f"{processor}, one function in {time.monotonic() - start:.1f} s"
     except Exception as error:  # whatever it is, it is what a report needs
         return {"state": "fails", "words": f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"}
     return {"state": "works" if right else "computes wrong numbers", "words": words}

@@ -276,3 +276,10 @@ class LinkedCompiler(compiler.CompilerBase):
         passes.add_pass_after(_KnownToCallers, typed_passes.NativeLowering)
         passes.finalize()
         return [passes]
+
+
+def processor_compiled_for() -> tuple[bool, str]:
+    """(whether a function compiled here gives the right number, the name of the processor). Raises what numba does."""
+    from llvmlite import binding
+
+    return bool(numba.njit(lambda x: 2.0 * x)(1.0) == 2.0), str(binding.get_host_cpu_name())
