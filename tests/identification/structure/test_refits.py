@@ -1,44 +1,40 @@
-"""Candidates that are fitted before they are ranked: other shapes of friction, and what that costs."""
+"""Fits with a cause begin where the fit before ended, though `init` only guessed a number; its prior stays the file's."""
 
-from benchmarks.wrong_worlds.kinds import by_name
-from benchmarks.wrong_worlds.log import logged, robot_of
-from benchmarks.wrong_worlds.score import FRICTION, drawn
+import numpy as np
+import pytest
+
 from omnidyn.identification.identify import identify
-from omnidyn.identification.methods import OutputError
-from omnidyn.identification.structure import diagnosis
 from omnidyn.identification.structure.missing import refits
-from omnidyn.model.keys import WHEELS
-from omnidyn.model.robot_file import load_robot
+from omnidyn.model.first_guess import first_guess, with_gear
+from omnidyn.model.robot import GIVEN
+from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.support.axebot_logs import excitation, noisy_draw
 
 
-def test_friction_at_the_wheels_under_the_file_of_a_box_is_named_first():
-    """A simulator that shares no code; a column near the fit named limits, radii and resistances instead."""
-    case, seed, _ = drawn(by_name("wheels"), 65)
-    lack = identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION)).lack_of_fit
-    assert lack.found
-    first = lack.remedies[0]
-    assert first.key == WHEELS
-    assert first.gain > first.gain_std
+def test_numbers_with_a_prior_begin_where_they_were_found(axebot, monkeypatch):
+    """Friction of every axis by itself: the disc of `init` misses it, so that causes are fitted."""
+    wheels = axebot.wheels.replace(wheel_radius=0.035, robot_radius=0.1)
+    guessed = with_gear(first_guess("mine", wheels, 1.5, 6.0), 19.0, "", GIVEN)
+    random = np.random.default_rng(7)
+    run = simulate(axebot, np.repeat(random.uniform(-6.0, 6.0, (20, 3)), 50, axis=0), 0.01)
+    speeds = run.channels["wheel_speed"] + 0.02 * random.standard_normal((len(run), 3))
+    begun, begin = [], refits._begun
 
+    def noted(candidate, way, problem, solution, errors):
+        fit = begin(candidate, way, problem, solution, errors)
+        begun.append((fit, problem, solution))
+        return fit
 
-def test_a_right_model_costs_no_fit_of_others(monkeypatch):
-    """All that is tried of it stays within columns near the fit."""
-    asked = []
-    monkeypatch.setattr(diagnosis, "refits", lambda *args: asked.append(args) or {})
-    robot = load_robot("axebot")
-    log = noisy_draw(simulate(robot, excitation(20.0, 100.0), 0.01), 3)
-    assert not identify(log, robot, OutputError()).lack_of_fit.found
-    assert not asked
-
-
-def test_steps_are_few(monkeypatch):
-    """Every candidate STEPS of the solver, the best GO_ON of them MORE."""
-    taken, own = [], refits._Refit.gone_on
-    monkeypatch.setattr(refits._Refit, "gone_on", lambda self, steps: taken.append(steps) or own(self, steps))
-    case, seed, _ = drawn(by_name("resistance"), 61)
-    lack = identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION)).lack_of_fit
-    assert lack.found
-    assert sum(steps == refits.MORE_STEPS for steps in taken) <= refits.MORE_FITS
-    assert sum(steps == refits.STEPS for steps in taken) <= refits.BEST + 2 * len(refits.ALWAYS_TRIED)
+    monkeypatch.setattr(refits, "_begun", noted)
+    assert identify(Run(t=run.t, voltage=run.voltage, wheel_speed=speeds), guessed).lack_of_fit.found
+    compared = 0
+    for fit, problem, solution in begun:
+        found = dict(zip(problem.names, solution.state.point.values, strict=True))
+        held = dict(zip(problem.names, solution.held_parameters, strict=True))
+        priors = {p.name: p.prior for p in problem.parameters if p.prior}
+        for p, value in zip(fit.solver.problem.parameters, fit.state.point.values, strict=True):
+            if p.name in priors and not held[p.name] and p.part != "friction":
+                assert value == pytest.approx(found[p.name], rel=1e-9)
+                assert p.prior == priors[p.name]
+                compared += 1
+    assert compared >= 5
