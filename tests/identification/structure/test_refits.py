@@ -1,4 +1,4 @@
-"""Fits with a cause begin where the fit before ended, though `init` only guessed a number; its prior stays the file's."""
+"""Fits with a cause begin where the fit before ended, guesses of `init` too; their priors stay those of the file."""
 
 import numpy as np
 import pytest
