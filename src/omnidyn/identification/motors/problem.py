@@ -185,6 +185,11 @@ class MotorProblem(Fitted):
     parameters: tuple[Parameter, ...]
     pieces: tuple[Piece, ...]
 
+    @property
+    def engine(self) -> MotorEngine:
+        """What simulates it, with derivatives."""
+        return MotorEngine(self)
+
 
 class MotorEngine(Engine[MotorProblem]):
     """Residuals and sensitivities of a motor by the exact step."""
