@@ -11,7 +11,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.output_error.engines.kinds import Kind, kind_with
-from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.driven_motion import Motion
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
