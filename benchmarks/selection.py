@@ -65,8 +65,8 @@ def measure() -> Table:
     for blocks, name, limit in ((10, "beside BIC", True), (20, "three of motors, alone", False)):
         _together(table, blocks, name, limit)
     table.notes.append(
-        "where 3 blocks show an effect, or errors remember, the likelihood or BIC beside the rule keeps useless numbers "
-        "out: see the questions of one log together"
+        "where 3 blocks show an effect, or errors remember, likelihood or BIC beside the rule keep them out: "
+        "see the questions of one log together"
     )
     return table
 

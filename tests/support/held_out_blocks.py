@@ -1,4 +1,4 @@
-"""Errors of blocks of simulated logs, each held out in turn: what tests and the benchmark of the rule of selection see."""
+"""Errors of blocks of simulated logs, each held out in turn: for tests and the benchmark of the rule of selection."""
 
 from __future__ import annotations
 

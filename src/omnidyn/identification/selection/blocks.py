@@ -5,11 +5,12 @@ effect, and there are n of them:
 
     t = mean(d) / (std(d) / sqrt(n)),   p = P(T >= t), T of Student with n - 1 degrees of freedom
 
-A ratio forgets how large the errors of a block are: one block rules no sum, and an effect that one block alone shows has
-t <= 1, which no LIMIT below takes. One that a few blocks show strongly is found, where ranks and signs miss it. LIMIT is
-about one standard error, as rules of one standard error have it. Of models that are fitted to the other blocks a useless
-number makes most blocks worse, so that it passes far more rarely than LIMIT says: in 1 to 4 of 100 logs of white or
-heavy-tailed noise. `python -m benchmarks selection` measures that, and what is found, beside other rules.
+A ratio forgets how large the errors of a block are: one block rules no sum, and an effect that one block alone shows
+has t <= 1, which LIMIT does not take (of 50 blocks or less). One that a few blocks show strongly is found, where ranks
+and signs miss it. LIMIT is about one standard error, as rules of one standard error have it. Of models that are fitted
+to the other blocks a useless number makes most blocks worse, so that it passes far more rarely than LIMIT says: in 1 to
+4 of 100 logs of white or heavy-tailed noise. `python -m benchmarks selection` measures that, and what is found, beside
+other rules.
 """
 
 from __future__ import annotations
