@@ -77,7 +77,7 @@ def identify(
     speed, or from a table of steady points. The answer carries standard errors, 95 % intervals and warnings in words,
     and says what the data cannot tell.
     """
-    from omnidyn.cli.identify_logs import Reading, is_motor_table, is_steady_table
+    from omnidyn.cli.identify_logs import LogReading, is_motor_table, is_steady_table
     from omnidyn.cli.identify_show import Out, tell_table
 
     request, to = identify_options.identify_request(given), Out(report, out, force, json, full)
@@ -96,7 +96,7 @@ def identify(
     if request.what == MOTORS and len(logs) == 1 and flags.rate is None and is_motor_table(logs[0]):
         tell_motor_table(logs[0], robot, request, to)
         return
-    _identify(logs, robot, request, Reading(flags.options(), flags.sort, flags.maps(force)), to)
+    _identify(logs, robot, request, LogReading(flags.options(), flags.sort, flags.maps(force)), to)
 
 
 def _identify(arguments: list[str], robot: str, request: IdentifyRequest, reading: Any, to: Any) -> None:

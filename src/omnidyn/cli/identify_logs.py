@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SNIFF_BYTES, SHOWN_NOTES = 64 * 2**10, 12
 
 
-class Reading(NamedTuple):
+class LogReading(NamedTuple):
     """How logs are read."""
 
     options: LogOptions
@@ -65,7 +65,7 @@ def _first_names(path: str) -> set[str]:
 
 
 def load_runs(
-    arguments: Sequence[str], request: IdentifyRequest, robot: Robot | None, reading: Reading, progress: Progress
+    arguments: Sequence[str], request: IdentifyRequest, robot: Robot | None, reading: LogReading, progress: Progress
 ) -> Loaded:
     """The runs of LOG... that belong to a group, where there are any; what the readers had to decide is said once."""
     files = log_files(arguments)

@@ -107,7 +107,7 @@ def identify(
     """
     check_order("identify(logs, robot)", (logs, (Run, Log, SteadyTable, MotorTable)), (robot, (Robot, type(None))))
     refuse_unless_method(method)
-    request = _Asked(
+    request = _Request(
         robot,
         groups,
         (hold_out,) if isinstance(hold_out, str) else tuple(hold_out),
@@ -150,7 +150,7 @@ def identify(
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Request:
     """What is asked beside the method, who hears what is done, who takes estimates, and what was not made.
 
     fit_time [s]: processor time of the fit.
@@ -206,7 +206,7 @@ def _discard(message: object) -> None:
     """Discards what is told."""
 
 
-def _of_steady_table(table: SteadyTable, method: Method, request: _Asked) -> Identification:
+def _of_steady_table(table: SteadyTable, method: Method, request: _Request) -> Identification:
     """The paper's line on each axis."""
     if not isinstance(method, SteadyState):
         raise InputError(
@@ -224,7 +224,7 @@ def _of_steady_table(table: SteadyTable, method: Method, request: _Asked) -> Ide
 
 
 def _of_motors(
-    runs: Sequence[Run] | MotorTable, method: Method, check: Sequence[Log], request: _Asked
+    runs: Sequence[Run] | MotorTable, method: Method, check: Sequence[Log], request: _Request
 ) -> Identification:
     """Every motor of some logs, or of a table."""
     from omnidyn.identification.motors.study import study_motors, study_points  # imported lazily: slow to load
@@ -246,7 +246,7 @@ def _of_motors(
     return Identification(method, {}, request.without_more(study.verdicts, study.advice), study=study)
 
 
-def _steady(runs: Sequence[Run], method: SteadyState, check: Sequence[Log], request: _Asked) -> Identification:
+def _steady(runs: Sequence[Run], method: SteadyState, check: Sequence[Log], request: _Request) -> Identification:
     robot = request.of_friction()
     verdicts = log_verdicts(check, robot, request.progress)
     names = names_of_groups(request.groups, [run.source for run in runs])
@@ -271,7 +271,7 @@ def _steady(runs: Sequence[Run], method: SteadyState, check: Sequence[Log], requ
     return Identification(method, study.estimates, follow_up, study.differences, study)
 
 
-def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], request: _Asked) -> Identification:
+def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], request: _Request) -> Identification:
     robot = request.of_friction()
     if robot.drive.kind == SPEED and (reason := why_not_output_error(runs, robot)):
         words = f"{reason}; `method` {STEADY_STATE} answers in seconds"
@@ -320,7 +320,7 @@ def _after(
     verdicts: tuple[Verdict, ...],
     check: Sequence[Log],
     repeat_notes: Sequence[Statement],
-    request: _Asked,
+    request: _Request,
 ) -> After:
     """What follows fits to whole logs. runs_of_group, held_out_runs: group -> the runs it was fitted to, and those held
     out of it.
@@ -345,7 +345,7 @@ def _after(
     return After(fits, validations, verdicts, tuple(steps), attempts)
 
 
-def _diagnosed(fits: Mapping[str, OutputErrorEstimate], request: _Asked) -> dict[str, OutputErrorEstimate]:
+def _diagnosed(fits: Mapping[str, OutputErrorEstimate], request: _Request) -> dict[str, OutputErrorEstimate]:
     """The fits with their diagnosis; without one where it fails, or is not asked for."""
     if request.quick:
         request.attempts.leave_out(DIAGNOSIS, BY_QUICK)
@@ -383,7 +383,7 @@ def _not_independent(runs: Sequence[Run], held_mask: Sequence[bool]) -> list[Sta
 
 
 def _answered(
-    runs: Sequence[Run], method: OutputError, groups: Sequence[str] | None, request: _Asked
+    runs: Sequence[Run], method: OutputError, groups: Sequence[str] | None, request: _Request
 ) -> tuple[Answer, bool]:
     """(answer, whether an interrupt cut the fit off)."""
     steps = 0

@@ -18,7 +18,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.run_file import columns_of, refuse_other_units
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 
 MAX_STEPS = 10_000_000
 KINDS = ("voltage", "duty", "wheel_speed_command", "twist_command")
@@ -115,7 +115,7 @@ def _read(
     return HeldCommands(kind, rows[:row_count], dt, float(t[0]), table.sha256, battery, notes)
 
 
-def _numbered(table: Table, kind: str) -> list[str]:
+def _numbered(table: FileTable, kind: str) -> list[str]:
     """The columns of the table that belong to a kind of command, for any number of wheels."""
     if kind == "twist_command":
         return [name for name in table.names if name in columns_of(kind, 0)]
@@ -123,7 +123,7 @@ def _numbered(table: Table, kind: str) -> list[str]:
     return [name for name in table.names if re.fullmatch(pattern, name)]
 
 
-def _check_columns(table: Table, kind: str, wheels: int) -> None:
+def _check_columns(table: FileTable, kind: str, wheels: int) -> None:
     expected = ["t_s", *columns_of(kind, wheels)]
     optional = ["supply_V"] if kind == "duty" else []
     input_columns = _numbered(table, kind)
@@ -140,7 +140,7 @@ def _check_columns(table: Table, kind: str, wheels: int) -> None:
     refuse_other_units(table)
 
 
-def _check_time(table: Table, t: FloatArray) -> None:
+def _check_time(table: FileTable, t: FloatArray) -> None:
     bad_steps = np.flatnonzero(~(np.diff(t) > 0.0))
     if bad_steps.size:
         row = int(bad_steps[0]) + 1
@@ -155,7 +155,7 @@ def _check_time(table: Table, t: FloatArray) -> None:
         )
 
 
-def _intervals(table: Table, t: FloatArray, duration: float | None) -> tuple[FloatArray, int]:
+def _intervals(table: FileTable, t: FloatArray, duration: float | None) -> tuple[FloatArray, int]:
     """How long each row holds [s], and how many rows there are within the duration."""
     if len(t) == 1 and duration is None:
         raise InputError(
