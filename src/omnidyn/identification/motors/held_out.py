@@ -27,10 +27,12 @@ from omnidyn.identification.output_error.problem.nuisances import earliest
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
+from omnidyn.statement import WARNING, Statement
 
 NUMBERS = (BAND, OFFSET, LATENCY)
 FOLDS, BLOCKS, LEAST_BLOCK = 5, 20, 8  # rows of a block at least
 BLOCK_ITERATIONS = 12  # iterations of a fit without some blocks, which begins at that to all
+ANSWERS = 0.5  # of the spread of held-out rows: a free run that misses less follows its input
 ERROR_LIMIT = 5.0  # scales of the noise that an error counts at most, where it is that of Student's t
 
 
@@ -237,13 +239,17 @@ def written_and_plain(logs: Sequence[MotorLog], motor: int, method: MotorFit) ->
     written_fit = fit(model.names, model)
     intervals = {name: _interval(fit((*model.names, name), model), name) for name in choice.rejected}
     blocks = HeldOut(model.size, plain_model.size, comparison=model.beside(plain_model) if model.names else None)
-    latency_notes = tuple(written_fit.late_statements(min(log.step for log in logs)))
+    notes = tuple(written_fit.late_statements(min(log.step for log in logs)))
+    follows_input = blocks.written < ANSWERS
+    if follows_input and not written_fit.answers:
+        notes += (Statement("answers_by_free_run", WARNING),)
     return replace(
         written_fit,
         blocks=blocks,
         rejected=intervals,
         comparisons=choice.comparisons,
-        warnings=(*written_fit.warnings, *latency_notes),
+        answers=written_fit.answers or follows_input,
+        warnings=(*written_fit.warnings, *notes),
     ), fit((), plain_model)
 
 
