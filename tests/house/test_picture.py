@@ -1,4 +1,4 @@
-"""The picture of the house in CONTRIBUTING.md is that of the imports, and its route leads through files that are there."""
+"""The picture of the house in CONTRIBUTING.md is that of the imports; its route leads through files that are there."""
 
 import re
 
