@@ -49,28 +49,14 @@ class HeldCommands:
         return self.rows
 
     def __iter__(self) -> Iterator[Any]:
-        """Unpacks as `voltage, dt, t0, sha256 = read_voltages(...)`."""
+        """Unpacks as `voltage, dt, t0, sha256 = read_commands(...)`."""
         return iter((self.voltage, self.dt, self.t0, self.sha256))
-
-
-def read_voltages(
-    path: str | os.PathLike, wheels: int, duration: float | None = None, max_steps: int = MAX_STEPS
-) -> HeldCommands:
-    """Read a voltage file for a robot of `wheels` wheels; see `read_commands`, of which only volts are taken.
-
-    Args:
-        path: The file.
-        wheels: Number of wheels.
-        duration: Of all rows together [s].
-        max_steps: Largest number of rows.
-    """
-    return _read(path, wheels, duration, max_steps, KINDS[:1])
 
 
 def read_commands(
     path: str | os.PathLike, wheels: int, duration: float | None = None, max_steps: int = MAX_STEPS
 ) -> HeldCommands:
-    """Read a command file for a robot of `wheels` wheels.
+    """Read a command file, such as one of voltages, for a robot of `wheels` wheels.
 
     Each row holds until the next. The last row holds as long as the one before it, or until `duration` [s] after the
     first row; a file of one row needs `duration`. Rows that begin after the duration are left out, with a note.
@@ -84,16 +70,10 @@ def read_commands(
 
     Raises InputError for wrong columns, times that do not increase, more than `max_steps` rows, a bad duration.
     """
-    return _read(path, wheels, duration, max_steps, KINDS)
-
-
-def _read(
-    path: str | os.PathLike, wheels: int, duration: float | None, max_steps: int, kinds: tuple[str, ...]
-) -> HeldCommands:
     if duration is not None and not (0.0 < duration < np.inf):
         raise InputError("cannot simulate for that long", got=duration, expected="a duration above 0 s")
     table = read_table(path)
-    kind = next((kind for kind in kinds if _numbered(table, kind)), kinds[0])
+    kind = next((kind for kind in KINDS if _numbered(table, kind)), KINDS[0])
     _check_columns(table, kind, wheels)
     if len(table) > max_steps:
         raise InputError(
