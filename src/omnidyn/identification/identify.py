@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from time import process_time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from omnidyn.arguments import MADE_BY, check_order, is_frame
 from omnidyn.attempts import BY_QUICK, COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, Attempts
@@ -40,9 +40,7 @@ from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.steady.steady_state import fit_steady_state, identify_lines
 from omnidyn.identification.steady.study import diagnosed, fit_steady, undiagnosed
 from omnidyn.identification.validation import validate
-from omnidyn.identification.verdict import (
-    of_group,
-)
+from omnidyn.identification.verdict import of_group
 from omnidyn.identification.whole_logs import solved
 from omnidyn.logs.log import Log
 from omnidyn.logs.motor_table import MotorTable
@@ -52,9 +50,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
 from omnidyn.statement import NOTE, WARNING, Statement, statements
-
-if TYPE_CHECKING:
-    pass
 
 Logs = Run | Log | Sequence[Run | Log] | SteadyTable | MotorTable
 Save = Callable[[Mapping[str, Estimate]], object]
@@ -128,9 +123,7 @@ def identify(
     reason = ""
     request = replace(request, robot=as_driven(request.of_friction(), runs))
     if method is None:
-        method, reason = (
-            (OutputError(), "") if request.hold_out else default_method(runs, request.of_friction(), progress)
-        )
+        method, reason = default_method(runs, request.of_friction(), request.hold_out, progress)
     request.refuse(method)
     if isinstance(method, SteadyState):
         identification = _steady(runs, method, check, request)
