@@ -7,7 +7,7 @@ import omnidyn
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.prepare import guesses
 from omnidyn.identification.output_error.problem.parameters import Parameter
-from omnidyn.identification.output_error.problem.problem import Fitted
+from omnidyn.identification.output_error.problem.problem import FitProblem
 from omnidyn.identification.output_error.solve.steps import Order
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key
@@ -118,7 +118,7 @@ def test_what_is_guessed_is_free_by_itself(truth):
     assert abs(fit.value[HELD] - 2.8) <= 3.0 * fit.std[HELD]
 
 
-class Some(Fitted):
+class Some(FitProblem):
     def __init__(self, *names):
         self.parameters, self.pieces = tuple(Parameter(name, 1.0, 0.0, 10.0) for name in names), ()
 
