@@ -16,8 +16,6 @@ OTHER_QUESTIONS = {"output_error/problem/nuisances.py"}
 KEPT = {
     "motors/choice.py",
     "motors/estimate.py",
-    "output_error/linear/blocks.py",
-    "output_error/linear/free_run.py",
     "steady/choice.py",
     "structure/ladder/held_out.py",
     "structure/missing/remedies.py",

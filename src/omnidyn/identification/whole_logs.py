@@ -80,13 +80,15 @@ def with_size(fit: Fit, solution: Solution, runs: Sequence[Run], progress: FitPr
         return fit, solution
     margins = margins_of([solution, wider_solution])
     narrow_run, wide_run = free_run(solution, margins), free_run(wider_solution, margins)
-    if not wide_run.is_better(narrow_run):
+    comparison = wide_run.improvement(narrow_run)
+    if comparison is None:
         return fit, solution
     numbers = {
         "latency": late_notes[0].numbers["latency"],
         "keys": tuple(size_keys),
         "error": narrow_run.error,
         "with": wide_run.error,
+        **comparison.counts,
     }
     size_note = Statement("size_fitted", WARNING, numbers=numbers)
     return wider_fit, replace(

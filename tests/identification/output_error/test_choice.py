@@ -68,7 +68,8 @@ def test_a_constant_push_is_fitted_where_it_is_there(tmp_path):
     for axis, truth in zip(("x", "y", "yaw"), PUSH, strict=True):
         found = result.nuisances[f"push.{axis}"]
         assert abs(found.value - truth) < max(4.0 * found.std, 0.02 * abs(truth))
-    assert "constant_force" in codes(result)
+    (force,) = (warning for warning in result.warnings if warning.code == "constant_force")
+    assert "10 of 10 blocks are predicted better" in str(force)
     assert result.held_out.written < 1.1 * share_of_noise(log)
     assert result.held_out.plain > 3.0 * result.held_out.written
 
@@ -130,10 +131,10 @@ def test_one_run_is_better_by_more_than_its_blocks_scatter():
     even = FreeRun(np.full((10, 2), 4.0), rows, spread)
     assert even.error == pytest.approx(np.sqrt(np.sqrt(0.4) * np.sqrt(0.4) / 2.0))
     better = FreeRun(np.full((10, 2), 3.0), rows, spread)
-    assert better.is_better(even)
-    assert not even.is_better(better)
-    hardly = FreeRun(np.full((10, 2), 3.8), rows, spread)
-    assert not hardly.is_better(even)  # 5 % of the squares
+    assert better.improvement(even).better == 10
+    assert even.improvement(better) is None
+    hardly = FreeRun(np.full((10, 2), 3.88), rows, spread)
+    assert hardly.improvement(even) is None  # 3 % of the squares
     before, after = np.full((10, 2), 4.0), np.full((10, 2), 4.6)
     before[3], after[3] = 40.0, 20.0
-    assert not FreeRun(after, rows, spread).is_better(FreeRun(before, rows, spread))  # in one block of ten
+    assert FreeRun(after, rows, spread).improvement(FreeRun(before, rows, spread)) is None  # in one block of ten

@@ -39,6 +39,11 @@ class BlockComparison:
     p: float
 
     @property
+    def counts(self) -> dict[str, float]:
+        """The numbers of blocks and the gain, as statements have them."""
+        return {"better": self.better, "blocks": self.blocks, "gain": self.gain}
+
+    @property
     def is_better(self) -> bool:
         """Whether the model with the effect predicts better, by more than chance."""
         return self.p < LIMIT

@@ -20,9 +20,9 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Point, Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 
-BETTER_ERRORS = 1.0  # standard errors of the difference by which one fit must predict better to be taken for another
-LEAST_GAIN = 0.1  # of the squared error, the same: 5 % of the error
+LEAST_GAIN = 0.05  # of the squared error, by which one fit must predict better to be taken for another
 TINY = 1e-300
 
 
@@ -47,13 +47,12 @@ class FreeRun:
         share = np.sqrt(self.square.sum(axis=0)[seen_outputs] / self.rows[seen_outputs]) / self.spread[seen_outputs]
         return float(np.exp(np.log(np.maximum(share, TINY)).mean())) if seen_outputs.any() else np.nan
 
-    def is_better(self, reference: FreeRun) -> bool:
-        """Whether it predicts blocks clearly better than another: by the share of the squared error that it takes away,
-        the mean of all outputs, beyond BETTER_ERRORS standard errors of it."""
-        reference_squares = np.maximum(reference.square.sum(axis=0), TINY)
-        gain = ((reference.square - self.square) / reference_squares)[:, self.rows > 0.0].mean(axis=1)
-        spread = float(gain.std(ddof=1)) * np.sqrt(len(gain))
-        return bool(gain.sum() > max(BETTER_ERRORS * spread, LEAST_GAIN))
+    def improvement(self, reference: FreeRun) -> BlockComparison | None:
+        """How much better than another it predicts blocks, by their squared errors, each output over what the other
+        leaves; None where it is not better by more than chance and by LEAST_GAIN."""
+        share = np.where(self.rows > 0.0, 1.0 / np.maximum(reference.square.sum(axis=0), TINY), 0.0)
+        comparison = compare_blocks(reference.square @ share, self.square @ share)
+        return comparison if comparison.is_better and comparison.gain > LEAST_GAIN else None
 
 
 def free_run(
