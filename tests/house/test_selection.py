@@ -17,9 +17,6 @@ KEPT = {
     "motors/choice.py",
     "motors/estimate.py",
     "steady/choice.py",
-    "structure/ladder/held_out.py",
-    "structure/missing/remedies.py",
-    "structure/tails.py",
 }
 
 

@@ -68,6 +68,20 @@ def test_errors_that_differ_by_rounding_are_equal():
     assert compare_blocks(values, np.ones(10)).p == 1.0
 
 
+def test_errors_of_0_to_rounding_tell_nothing():
+    """A square that is computed by differences may be below 0."""
+    zeros = 1e-18 * np.random.default_rng(0).standard_normal((2, 9))
+    comparison = compare_blocks(np.append(zeros[0], 1.0), np.append(zeros[1], 0.9))
+    assert comparison.better == 1
+    assert not comparison.is_better
+
+
+def test_the_standard_error_is_that_of_the_ratios():
+    ratio = np.random.default_rng(5).normal(0.1, 0.2, 10)
+    comparison = compare_blocks(np.exp(ratio), np.ones(10))
+    assert comparison.std == pytest.approx(np.exp(-ratio.mean()) * ratio.std(ddof=1) / np.sqrt(10))
+
+
 def found(effect, count, logs=1000, **kind):
     """The share of logs in which the effect is found."""
     without, with_effect, _ = errors_of_blocks(1, logs, count, effect, **kind)

@@ -25,17 +25,19 @@ from omnidyn.arrays import FloatArray
 
 LIMIT = 0.16  # of p, below which a model is better
 ALIKE = 1e-9  # of an error, by which two are the same
-TINY = 1e-300
+ROUNDING, TINY = 1e-12, 1e-300  # of the largest error, below which one is 0; the same where all are
 
 
 @dataclass(frozen=True)
 class BlockComparison:
     """better: of how many blocks the error is smaller with the effect, of `blocks`. gain: share of the squared error
-    that it takes away, the geometric mean over the blocks. p: chance of so much where it does nothing."""
+    that it takes away, the geometric mean over the blocks; std: its standard error. p: chance of so much where it does
+    nothing."""
 
     better: int
     blocks: int
     gain: float
+    std: float
     p: float
 
     @property
@@ -56,19 +58,22 @@ def compare_blocks(without: FloatArray | Sequence[float], with_effect: FloatArra
     """
     first, second = np.asarray(without, float), np.asarray(with_effect, float)
     counted = np.isfinite(first) & np.isfinite(second)
-    ratio = np.log(np.maximum(first[counted], TINY)) - np.log(np.maximum(second[counted], TINY))
+    first, second = first[counted], second[counted]
+    least = max(ROUNDING * max(first.max(), second.max()), TINY) if counted.any() else TINY
+    ratio = np.log(np.maximum(first, least)) - np.log(np.maximum(second, least))
     ratio[np.abs(ratio) < ALIKE] = 0.0
-    mean = float(ratio.mean()) if len(ratio) else 0.0
-    return BlockComparison(int((ratio > 0.0).sum()), len(ratio), -float(np.expm1(-mean)), _student(ratio))
+    n, mean = len(ratio), float(ratio.mean()) if len(ratio) else 0.0
+    error = float(ratio.std(ddof=1)) / np.sqrt(n) if n > 1 else 0.0
+    # By the rule of propagation of errors; a mean of -700 is beyond what exp holds.
+    share = float(np.exp(min(-mean, 700.0)))
+    return BlockComparison(int((ratio > 0.0).sum()), n, 1.0 - share, share * error, _student(mean, error, n))
 
 
-def _student(values: FloatArray) -> float:
+def _student(mean: float, error: float, n: int) -> float:
     """P of Student's paired test, one-sided; never surer than that all signs are alike, 1/2^n."""
-    n = len(values)
-    if not values.any():
+    if not mean:
         return 1.0
-    error = float(values.std(ddof=1)) / np.sqrt(n) if n > 1 else 0.0
     least = 0.5**n
-    if error <= ALIKE * abs(float(values.mean())):
-        return least if values.mean() > 0.0 else 1.0 - least
-    return max(float(stdtr(n - 1, -float(values.mean()) / error)), least)
+    if error <= ALIKE * abs(mean):
+        return least if mean > 0.0 else 1.0 - least
+    return max(float(stdtr(n - 1, -mean / error)), least)
