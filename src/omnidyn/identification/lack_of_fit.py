@@ -107,7 +107,7 @@ class Remedy:
     gain: share of the squared held-out error that it takes away, with its standard error. same_as: keys that the
     log cannot tell from it. share: of all that residuals hold beside noise, that it explains. offered: whether a
     robot file or a fit holds such. chi2: by how much it lowers the sum of squares, in those of the noise; numbers:
-     how many it fits. comparison: how held-out blocks are predicted with it. size, at: its fitted change and where it
+    how many it fits. comparison: how held-out blocks are predicted with it. size, at: its fitted change and where it
     was tried, both of a first step. changes: number -> (what it is, what it would be with it, to first order). force:
     where it was fitted to forces at steady state."""
 
