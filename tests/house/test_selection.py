@@ -14,8 +14,6 @@ OTHER_QUESTIONS = {"output_error/problem/nuisances.py"}
 
 # What still has a rule of its own. What asks `compare_blocks` by now must go from this list.
 KEPT = {
-    "motors/choice.py",
-    "motors/estimate.py",
     "steady/choice.py",
 }
 

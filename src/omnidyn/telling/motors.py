@@ -255,8 +255,8 @@ SENTENCES = {
     "slope_may_be_zero": Sentence(_slope_may_be_zero),
     "dead_band_not_needed": Sentence(_dead_band_not_needed),
     "held_out_no_better": Sentence(
-        "{subject}: held-out logs are predicted no better with its dead band (error {written:.4g} {travel}/s, "
-        "{plain:.4g} by slope and lag alone): it may be an effect of something else"
+        "{subject}: held-out logs are predicted no better with its dead band ({better} of {blocks} blocks are; error "
+        "{written:.4g} {travel}/s, {plain:.4g} by slope and lag alone): it may be an effect of something else"
     ),
     "motor_held_out_blocks": Sentence(_held_out_blocks),
     "dead_band_rejected": Sentence(

@@ -63,10 +63,10 @@ def compare_blocks(without: FloatArray | Sequence[float], with_effect: FloatArra
     ratio = np.log(np.maximum(first, least)) - np.log(np.maximum(second, least))
     ratio[np.abs(ratio) < ALIKE] = 0.0
     n, mean = len(ratio), float(ratio.mean()) if len(ratio) else 0.0
-    error = float(ratio.std(ddof=1)) / np.sqrt(n) if n > 1 else 0.0
+    error = float(ratio.std(ddof=1) / np.sqrt(n)) if n > 1 else 0.0
     # By the rule of propagation of errors; a mean of -700 is beyond what exp holds.
     share = float(np.exp(min(-mean, 700.0)))
-    return BlockComparison(int((ratio > 0.0).sum()), n, 1.0 - share, share * error, _student(mean, error, n))
+    return BlockComparison(int((ratio > 0.0).sum()), n, 1.0 - share, float(share * error), _student(mean, error, n))
 
 
 def _student(mean: float, error: float, n: int) -> float:
