@@ -11,6 +11,7 @@ from omnidyn.identification.output_error import fit
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear import blocks as held_out
 from omnidyn.identification.output_error.linear.blocks import Blocks, _without, _without_it, rejected_nuisances
+from omnidyn.identification.selection.blocks import compare_blocks
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy_draw
@@ -91,4 +92,4 @@ def test_the_error_of_blocks_is_that_of_fits_to_all_others():
     assert _without(blocks, 2, step).held_out(at[at != 3]) == pytest.approx(without, rel=1e-9)
     comparison = _without_it(blocks, at, 2, step)
     assert (comparison.better, comparison.blocks) == ((without < with_).sum(), 10)
-    assert comparison.gain == pytest.approx(1.0 - np.exp(np.log(without / with_).mean()), rel=1e-9)
+    assert comparison.p == pytest.approx(compare_blocks(with_, without).p, rel=1e-9)

@@ -22,7 +22,6 @@ from omnidyn.identification.output_error.problem.problem import Column, Point, P
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 
-LEAST_GAIN = 0.05  # of the squared error, by which one fit must predict better to be taken for another
 TINY = 1e-300
 
 
@@ -49,10 +48,10 @@ class FreeRun:
 
     def improvement(self, reference: FreeRun) -> BlockComparison | None:
         """How much better than another it predicts blocks, by their squared errors, each output over what the other
-        leaves; None where it is not better by more than chance and by LEAST_GAIN."""
+        leaves; None where it is not clearly better."""
         share = np.where(self.rows > 0.0, 1.0 / np.maximum(reference.square.sum(axis=0), TINY), 0.0)
         comparison = compare_blocks(reference.square @ share, self.square @ share)
-        return comparison if comparison.is_better and comparison.gain > LEAST_GAIN else None
+        return comparison if comparison.is_clear else None
 
 
 def free_run(
