@@ -53,7 +53,7 @@ def test_a_way_of_reading_the_input_that_the_logs_refute_claims_no_friction(benc
 
 
 def test_the_way_is_chosen_on_training_logs_alone(bench):
-    """step1 and chirp1, each predicted by the other: a curve through the rows, and no friction; that predicts the others.
+    """step1 and chirp1, each predicted by the other: a curve through the rows, and no friction; it predicts the others.
 
     By the sum of squares it was the mean of two rows, which predicts chirp1 better and all of step1 worse.
     """
