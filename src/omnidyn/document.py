@@ -15,6 +15,7 @@ from typing import Any
 WIDTH = 100  # columns of text that knows no terminal
 GAP = "  "  # between two columns of a table
 TINY_CHANCE = 0.001
+MOST_DIGITS = 6  # of two numbers that are nearly alike
 MOST_WHOLE = 1e6  # from which on an exponent reads better
 
 Paint = Callable[[str, str], str]  # a word and its tone -> the word in the colour of that tone
@@ -174,6 +175,15 @@ def short(value: float, form: str = ".2g") -> str:
     """A number of a sentence: 120, where Python writes 1.2e+02."""
     text = f"{value:{form}}"
     return f"{float(text):{form[: form.index('.')]}.0f}" if "e+" in text and abs(value) < MOST_WHOLE else text
+
+
+def both(first: float, second: float, digits: int = 3) -> tuple[str, str] | None:
+    """Two numbers of a sentence with as many digits as show that they differ; None where MOST_DIGITS do not."""
+    for count in range(digits, MOST_DIGITS + 1):
+        words = (short(first, f".{count}g"), short(second, f".{count}g"))
+        if words[0] != words[1]:
+            return words
+    return None
 
 
 def cell(value: float | None, form: str) -> str:

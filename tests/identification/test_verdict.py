@@ -211,6 +211,7 @@ def motor(number, band=0.5, seen=True, slope=(0.1, 0.2)) -> Any:
         name="all motors" if number is None else f"motor {number + 1}",
         unit="V",
         dead_band_seen=seen,
+        dead_band_needed=False,
         offset_seen=False,
         answers=slope[0] > 0.0,
         value={"dead_band": band},

@@ -24,6 +24,7 @@ UNREST_LIMITS = (
     0.001,
     0.1,
 )  # chance, and share, from which on it is said that a robot in motion leaves more than one at rest
+SMALL_MISS = 0.01  # of the spread: a free run that misses less on held-out rows leaves nothing out that has no cause
 LINE_SHARE = 0.01  # share of the variance of a residual that is worth a line
 CHANGED_NUMBERS, SEEN_CHANGE = (
     2,
@@ -187,7 +188,8 @@ class LackOfFit:
     beyond: those whose residuals are larger, by a source that decides. at_rest: the same where the robot rests.
     rounded: output -> share of the variance of its residuals that is of inputs that were rounded, or changed while rows
     are missing, which is no lack of fit, but hides one that is smaller. drifts: whether errors last so long that no
-    test tells them from a misfit. tried: names of what was tried, where all that was tried has one test.
+    test tells them from a misfit. tried: names of what was tried, where all that was tried has one test. missed: what
+    free runs miss on held-out rows, over the spread of the outputs; NaN where none were held out.
     """
 
     found: bool
@@ -204,6 +206,13 @@ class LackOfFit:
     rounded: Mapping[str, float] = field(default_factory=dict)
     drifts: bool = False
     tried: tuple[str, ...] = ()
+    missed: float = math.nan
+
+    @property
+    def is_small(self) -> bool:
+        """Whether free runs on held-out rows miss next to nothing, and no cause explains what is more than noise."""
+        has_cause = bool(self.causes) and (self.causes[0].confident or bool(self.causes[0].rivals))
+        return self.found and not has_cause and self.missed < SMALL_MISS
 
     @property
     def causes(self) -> tuple[Remedy, ...]:
@@ -217,6 +226,8 @@ class LackOfFit:
         worst_channel = max(self.channels, key=lambda name: self.channels[name], default="")
         themes = tuple(theme.theme for theme in self.follows[:2])
         beyond_channel = None if themes or self.causes else self._beyond_noise()
+        if self.is_small:
+            return Statement("misfit_small", NOTE, worst_channel, {"missed": self.missed})
         numbers = {"share": self.channels.get(worst_channel), "follows": themes, "beyond": beyond_channel}
         if not self.causes:
             return Statement("misfit_unexplained", WARNING, worst_channel, numbers)

@@ -100,6 +100,13 @@ class MotorEstimate:
         return is_determined and self.ci95[BAND][0] > 0.0 and self.ci95[SLOPE][0] > 0.0
 
     @property
+    def dead_band_needed(self) -> bool:
+        """Whether a dead band was fitted that held-out blocks need, however well its size is known."""
+        has_value = BAND in self.value and BAND not in (*self.rejected, *self.unidentifiable)
+        comparison = self.blocks.comparison if self.blocks else None
+        return has_value and comparison is not None and comparison.is_better
+
+    @property
     def offset_seen(self) -> bool:
         """Whether the interval of the offset lies on one side of 0."""
         return OFFSET in self.value and OFFSET not in self.unidentifiable and not _holds_zero(self.ci95[OFFSET])
@@ -184,7 +191,7 @@ class MotorEstimate:
 
     def _of_dead_band(self, has_start: bool) -> Statement:
         if BAND in self.rejected:
-            numbers = {"high": self.rejected[BAND][1], "unit": self.unit, "better": None, "blocks": None}
+            numbers = {"high": max(self.rejected[BAND][1], 0.0), "unit": self.unit, "better": None, "blocks": None}
             if comparison := self.comparisons.get(BAND):
                 numbers |= {"better": comparison.better, "blocks": comparison.blocks}
             return Statement("dead_band_rejected", NOTE, numbers=numbers)
@@ -197,6 +204,8 @@ class MotorEstimate:
             return Statement("line_meets_zero" if has_start else "dead_band_seen", NOTE, numbers=numbers | one_way)
         if BAND in self.unidentifiable:
             return Statement("dead_band_bounded", NOTE, numbers=numbers)
+        if self.dead_band_needed:
+            return Statement("dead_band_hardly_known", NOTE, numbers=numbers)
         if high < 0.0:
             return Statement("dead_band_negative", WARNING, numbers=numbers)
         return Statement("slope_may_be_zero" if low > 0.0 else "dead_band_not_needed", NOTE, numbers=numbers)

@@ -20,17 +20,19 @@ from omnidyn.identification.methods import degrees as degrees_of
 from omnidyn.identification.motors.estimate import BAND, LATENCY, OFFSET, MotorEstimate
 from omnidyn.identification.motors.fit import fit_motor, solved
 from omnidyn.identification.motors.log import WORDS, MotorLog
-from omnidyn.identification.motors.problem import MotorEngine, MotorProblem, MotorRecord, motor_problem, motor_record
+from omnidyn.identification.motors.problem import MotorProblem, MotorRecord, motor_problem, motor_record
 from omnidyn.identification.motors.rest import turns_both_ways
 from omnidyn.identification.motors.windows import line_numbers
 from omnidyn.identification.output_error.problem.nuisances import earliest
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
+from omnidyn.statement import WARNING, Statement
 
 NUMBERS = (BAND, OFFSET, LATENCY)
 FOLDS, BLOCKS, LEAST_BLOCK = 5, 20, 8  # rows of a block at least
 BLOCK_ITERATIONS = 12  # iterations of a fit without some blocks, which begins at that to all
+ANSWERS = 0.5  # of the spread of held-out rows: a free run that misses less follows its input
 ERROR_LIMIT = 5.0  # scales of the noise that an error counts at most, where it is that of Student's t
 
 
@@ -140,7 +142,7 @@ class _HeldOut:
         squares, rows = np.zeros((2, BLOCKS, len(problem.columns)))
         for fold in range(FOLDS):
             point = self._without(records, [record_blocks % FOLDS == fold for record_blocks in block], names, full_fit)
-            outputs = MotorEngine(problem).outputs(point)
+            outputs = problem.engine.outputs(point)
             for piece, (predicted, _) in zip(problem.pieces, outputs, strict=True):
                 column_indices = [problem.columns.index(column) for column in piece.record.columns]
                 piece_blocks = block[next(k for k, record in enumerate(records) if record is piece.record)]
@@ -178,7 +180,7 @@ class _HeldOut:
             for record, record_mask in zip(records, held_out_rows, strict=True)
         ]
         problem = _problem(kept_records, names)
-        solver = Solver(problem, MotorEngine(problem), self.degrees)
+        solver = Solver(problem, problem.engine, self.degrees)
         scales = full_fit.state.variance if self.degrees else None
         return solver.minimise(full_fit.state.point, BLOCK_ITERATIONS, scales=scales).state.point
 
@@ -237,13 +239,17 @@ def written_and_plain(logs: Sequence[MotorLog], motor: int, method: MotorFit) ->
     written_fit = fit(model.names, model)
     intervals = {name: _interval(fit((*model.names, name), model), name) for name in choice.rejected}
     blocks = HeldOut(model.size, plain_model.size, comparison=model.beside(plain_model) if model.names else None)
-    latency_notes = tuple(written_fit.late_statements(min(log.step for log in logs)))
+    notes = tuple(written_fit.late_statements(min(log.step for log in logs)))
+    follows_input = blocks.written < ANSWERS
+    if follows_input and not written_fit.answers:
+        notes += (Statement("answers_by_free_run", WARNING),)
     return replace(
         written_fit,
         blocks=blocks,
         rejected=intervals,
         comparisons=choice.comparisons,
-        warnings=(*written_fit.warnings, *latency_notes),
+        answers=written_fit.answers or follows_input,
+        warnings=(*written_fit.warnings, *notes),
     ), fit((), plain_model)
 
 
