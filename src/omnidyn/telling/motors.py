@@ -271,7 +271,7 @@ SENTENCES = {
             "blocks",
             "no dead band is kept: {better} of {blocks} held-out blocks are predicted better with one, no more than by "
             "chance; it is at most {high:.3g} {unit}",
-            "no dead band is kept: held-out blocks are predicted as well without; it is at most {high:.3g} {unit}",
+            "no dead band is kept: these logs do not tell it from 0; it is at most {high:.3g} {unit}",
         )
     ),
     "offset_as_friction": Sentence(_offset_as_friction),

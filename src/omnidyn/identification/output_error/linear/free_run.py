@@ -9,7 +9,7 @@ is that of a fit to all other blocks, one linear step from the fit to all.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from omnidyn.identification.output_error.problem.problem import Column, Point, P
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 
+TAIL = 6  # blocks of the log, to which a fit is made that the rest of it is predicted by
 TINY = 1e-300
 
 
@@ -38,6 +39,7 @@ class FreeRun:
     rows: FloatArray
     spread: FloatArray
     adds_up: bool = False
+    tail: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def error(self) -> float:
@@ -83,7 +85,7 @@ def free_run(
     white_rows = Linear(rows, white)
     residual, slopes = white_rows.whole()
     number, column = _places(white_rows)
-    steps = np.zeros((BLOCKS, slopes.shape[1]))
+    steps, tail_step = np.zeros((BLOCKS, slopes.shape[1])), np.zeros(slopes.shape[1])
     indices = 1 + np.flatnonzero(np.any(slopes != 0.0, axis=0))
     if indices.size:
         blocks = Blocks(
@@ -91,14 +93,20 @@ def free_run(
         )
         for b in range(BLOCKS):
             steps[b, indices - 1] = blocks.fitted(blocks.total - blocks.matrix[b], indices) / blocks.size[indices]
+        before = blocks.total - blocks.matrix[TAIL:].sum(axis=0)
+        tail_step[indices - 1] = blocks.fitted(before, indices) / blocks.size[indices]
     variance, square = np.array([model.variance for model in white]), np.zeros((BLOCKS, len(white)))
+    tail = np.zeros((BLOCKS - TAIL, len(white)))
     for b in range(BLOCKS):
         block = number == b
         block_residual = residual[block] - slopes[block] @ steps[b]
         square[b] = np.bincount(column[block], block_residual**2, len(white)) * variance
+        if b >= TAIL:
+            tail_residual = residual[block] - slopes[block] @ tail_step
+            tail[b - TAIL] = np.bincount(column[block], tail_residual**2, len(white)) * variance
     travels = np.array([name in TRAVELS for name, _ in problem.columns])
     count = np.where(travels & ~travels.all(), 0.0, rows.added(lambda k, j: rows.masks[k][j]))
-    return FreeRun(square, count, _spread(rows), bool(travels.all()))
+    return FreeRun(square, count, _spread(rows), bool(travels.all()), tail)
 
 
 def margins_of(solutions: Sequence[Solution]) -> list[FloatArray]:
