@@ -261,8 +261,14 @@ SENTENCES = {
         "{blocks} are predicted better without it, {gain:%.2g} % less squared error on average): it is not fitted"
     ),
     "late_by_rows": Sentence(
-        "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows of the log: a camera, a network or a filter may be as "
-        "late; a drive is not, and then an inertia or something else that the model misses stands behind it"
+        either(
+            "without",
+            "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows of the log (a free run misses {error:%.3g} % of "
+            "the spread of held-out outputs, {without:%.3g} % by the best fit without it): a camera, a network or a "
+            "filter may be as late; a drive is not, and then something that the model misses stands behind it",
+            "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows of the log: a camera, a network or a filter may be "
+            "as late; a drive is not, and then an inertia or something else that the model misses stands behind it",
+        )
     ),
     "size_fitted": Sentence(_size_fitted, "measure {keys}, and write them into the robot file"),
     "constant_force": Sentence(
@@ -285,6 +291,12 @@ SENTENCES = {
         "the robot as it was given predicts {better} of {blocks} held-out blocks of the log better than the fitted one "
         "(a free run misses {given:%.3g} % of the spread of the outputs, {error:%.3g} % after the fit): it is written",
         "record a longer log, or look for what the model misses",
+    ),
+    "given_predicts_tail_better": Sentence(
+        "the robot as it was given predicts the last 40 % of the log better than a fit to what comes before "
+        "({better} of {blocks} blocks, {gain:%.2g} % less squared error): for what comes after this log it may be "
+        "the better one",
+        "keep the robot as given, or record a longer log: errors that last as long as this one look like friction",
     ),
     "held_out_blocks": Sentence(
         either(

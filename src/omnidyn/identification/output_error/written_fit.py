@@ -144,8 +144,11 @@ def beside_given(
 
     comparison = runs()[2].improvement(runs()[0]) if may_take_given else None
     estimate = replace(estimate, reference=reference)
-    if comparison is None:
-        return estimate
-    numbers = {"error": runs()[0].error, "given": runs()[2].error, **comparison.counts}
-    statement = Statement("given_predicts_better", WARNING, numbers=numbers)
-    return replace(estimate, robot=given_robot, warnings=(statement, *estimate.warnings))
+    numbers = {"error": runs()[0].error, "given": runs()[2].error} if may_take_given else {}
+    if comparison is not None:
+        statement = Statement("given_predicts_better", WARNING, numbers=numbers | comparison.counts)
+        return replace(estimate, robot=given_robot, warnings=(statement, *estimate.warnings))
+    if may_take_given and (of_tail := runs()[2].tail_improvement(runs()[0])) is not None:
+        statement = Statement("given_predicts_tail_better", WARNING, numbers=numbers | of_tail.counts)
+        return replace(estimate, warnings=(statement, *estimate.warnings))
+    return estimate

@@ -9,7 +9,7 @@ is that of a fit to all other blocks, one linear step from the fit to all.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,7 +29,8 @@ TINY = 1e-300
 @dataclass(frozen=True, eq=False)
 class FreeRun:
     """The error of a free run on held-out blocks. square (B, C): sums of squares of each block and output; rows (C,):
-    how many there are; spread (C,): standard deviation of each output.
+    how many there are; spread (C,): standard deviation of each output. tail (B - TAIL, C): as square, of the last
+    blocks by a fit to those before, which tells more of what comes after a log whose errors last long.
 
     Of what adds up, such as an angle, a block begins with the errors of all blocks before: it counts where nothing else
     was measured, and there adds_up is True.
@@ -39,7 +40,7 @@ class FreeRun:
     rows: FloatArray
     spread: FloatArray
     adds_up: bool = False
-    tail: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    tail: FloatArray | None = None
 
     @property
     def error(self) -> float:
@@ -51,9 +52,21 @@ class FreeRun:
     def improvement(self, reference: FreeRun) -> BlockComparison | None:
         """How much better than another it predicts blocks, by their squared errors, each output over what the other
         leaves; None where it is not clearly better."""
-        share = np.where(self.rows > 0.0, 1.0 / np.maximum(reference.square.sum(axis=0), TINY), 0.0)
+        share = self._share(reference)
         comparison = compare_blocks(reference.square @ share, self.square @ share)
         return comparison if comparison.is_clear else None
+
+    def tail_improvement(self, reference: FreeRun) -> BlockComparison | None:
+        """How much better than another it predicts the tail of the logs; None where it is not clearly better."""
+        share = self._share(reference)
+        if self.tail is None or reference.tail is None:
+            return None
+        comparison = compare_blocks(reference.tail @ share, self.tail @ share)
+        return comparison if comparison.is_clear else None
+
+    def _share(self, reference: FreeRun) -> FloatArray:
+        """What a squared error of each output counts. Shape (C,)."""
+        return np.where(self.rows > 0.0, 1.0 / np.maximum(reference.square.sum(axis=0), TINY), 0.0)
 
 
 def free_run(
