@@ -266,8 +266,8 @@ SENTENCES = {
             "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows of the log (a free run misses {error:%.3g} % of "
             "the spread of held-out outputs, {without:%.3g} % by the best fit without it): a camera, a network or a "
             "filter may be as late; a drive is not, and then something that the model misses stands behind it",
-            "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows of the log: a camera, a network or a filter may be "
-            "as late; a drive is not, and then an inertia or something else that the model misses stands behind it",
+            "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows of the log: a camera, a network or a filter may "
+            "be as late; a drive is not, and then an inertia or something else that the model misses stands behind it",
         )
     ),
     "size_fitted": Sentence(_size_fitted, "measure {keys}, and write them into the robot file"),
