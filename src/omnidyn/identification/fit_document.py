@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from omnidyn.document import Document, Part, Points, Table, apart, interval_cell
 from omnidyn.findings.finding import Verdict
 from omnidyn.identification.estimate import NOT_DETERMINED
-from omnidyn.identification.lack_of_fit import Diagnosis
+from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.log_verdicts import checked
 from omnidyn.identification.methods import OUTPUT_ERROR
 from omnidyn.identification.output_error.answer import OutputErrorEstimate

@@ -71,13 +71,12 @@ SAME_SPEED = 1e-9  # spread of speeds over the largest, below which they are one
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MotorStudy(Displayable):
-    """motors: an estimate each, the last for all together where there are several in windows.
-
-    plain: the same motors by slope and lag alone, from free runs only, and not of those with a curve. method, kind, unit, speed_from: how they were
-    found. windows: that the lines go through, None of free runs; drawn: those of a picture of free runs. starts: each
-    direction of each motor by itself, with the input at which it sets off. supply [V]: of a duty, the mean of the logs;
-    NaN where it is not logged. log_warnings: of the logs; `warnings` has those of each motor too. verdicts:
-    of `check` on each log. curves: of the motors whose speed is no line of their input.
+    """motors: an estimate each, the last for all together where there are several in windows.  plain: the same motors
+    by slope and lag alone, from free runs only, and not of those with a curve. method, kind, unit, speed_from: how they
+    were found. windows: that the lines go through, None of free runs; drawn: those of a picture of free runs. starts:
+    each direction of each motor by itself, with the input at which it sets off. supply [V]: of a duty, the mean of the
+    logs; NaN where it is not logged. log_warnings: of the logs; `warnings` has those of each motor too. verdicts: of
+    `check` on each log. curves: of the motors whose speed is no line of their input.
     """
 
     method: str
@@ -115,11 +114,7 @@ class MotorStudy(Displayable):
         motor_statements += [statement for motor in self.motors if (statement := motor.of_blocks())]
         for estimate in self.motors:
             plain_motor = self._plain_of(estimate)
-            if (
-                plain_motor
-                and estimate.dead_band_seen
-                and estimate.held_out > (1.0 - PAYS) * plain_motor.held_out
-            ):
+            if plain_motor and estimate.dead_band_seen and estimate.held_out > (1.0 - PAYS) * plain_motor.held_out:
                 errors = {"written": estimate.held_out, "plain": plain_motor.held_out, "travel": estimate.travel}
                 motor_statements.append(Statement("held_out_no_better", WARNING, estimate.name, errors))
         return (
