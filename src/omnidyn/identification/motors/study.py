@@ -71,12 +71,13 @@ SAME_SPEED = 1e-9  # spread of speeds over the largest, below which they are one
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MotorStudy(Displayable):
-    """motors: an estimate each, the last for all together where there are several in windows.  plain: the same motors
-    by slope and lag alone, from free runs only, and not of those with a curve. method, kind, unit, speed_from: how they
-    were found. windows: that the lines go through, None of free runs; drawn: those of a picture of free runs. starts:
-    each direction of each motor by itself, with the input at which it sets off. supply [V]: of a duty, the mean of the
-    logs; NaN where it is not logged. log_warnings: of the logs; `warnings` has those of each motor too. verdicts: of
-    `check` on each log. curves: of the motors whose speed is no line of their input.
+    """motors: an estimate each, the last for all together where there are several in windows.
+
+    plain: the same motors by slope and lag alone, from free runs only, and not of those with a curve. method, kind,
+    unit, speed_from: how they were found. windows: that the lines go through, None of free runs; drawn: those of a
+    picture of free runs. starts: each direction of each motor by itself, with the input at which it sets off. supply
+    [V]: of a duty, the mean of the logs; NaN where it is not logged. log_warnings: of the logs; `warnings` has those of
+    each motor too. verdicts: of `check` on each log. curves: of the motors whose speed is no line of their input.
     """
 
     method: str
