@@ -54,6 +54,7 @@ NAMES = {
     "exports": "the paper's robot in C, FMU, MuJoCo, python-control, WPILib: errors, drift at rest (a minute)",
     "exported_c": "exported C on a million random calls under sanitizers: findings, the slowest call (four minutes)",
     "exported_robots": "20 robots of init and three presets in C and FMU: differences, sizes, stack (four minutes)",
+    "selection": "the rule of selection beside those before it: useless numbers taken, effects found (a minute)",
     "studio": "a drive of ten minutes in a browser, a silent client, many pages, an installation (13 minutes)",
     "stagger": "topics with clocks of their own: check, geometry and fits beside equal stamps (two minutes)",
     "studies": "intervals and false alarms over many draws: breakaway, laws, rounding, noise, motors (15 minutes)",

@@ -38,7 +38,7 @@ from omnidyn.model.motor import settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.batch.batch import Batch, simulate_batch
-from omnidyn.simulation.batch.choice import BOX, DIRECTION, EXACT, GENERAL, VOLTAGE, engine_kind
+from omnidyn.simulation.batch.engine_kind import BOX, DIRECTION, EXACT, GENERAL, VOLTAGE, engine_kind
 from omnidyn.simulation.batch.sample import MASS, RADIUS, Sample
 from omnidyn.simulation.engine import TOLERANCE
 

@@ -15,7 +15,7 @@ from omnidyn.identification.methods import AUTO
 from omnidyn.identification.motors.estimate import BAND, OFFSET, MotorEstimate
 from omnidyn.identification.motors.fit import MotorFits, fit_motor, fit_ways, logs_of_free_runs
 from omnidyn.identification.motors.log import CURVE, HOLD, MEAN, SUB
-from omnidyn.identification.motors.problem import SPEED, MotorEngine, motor_problem, motor_record
+from omnidyn.identification.motors.problem import SPEED, motor_problem, motor_record
 from omnidyn.identification.output_error.problem.record import SHORTEST
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run, as_list
@@ -38,7 +38,7 @@ def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]
     values = [fit.value.get(name, latency) for name in problem.names]
     point = replace(problem.start(), values=np.array(values))
     speeds_by_record = {id(r): np.full(len(r.t), np.nan) for r in records}
-    for piece, (predicted, _) in zip(problem.pieces, MotorEngine(problem).outputs(point), strict=True):
+    for piece, (predicted, _) in zip(problem.pieces, problem.engine.outputs(point), strict=True):
         rows = slice(piece.first, piece.last + 1)
         speeds_by_record[id(piece.record)][rows] = predicted[rows, 0]
     step = SUB if fit.between == CURVE else 1

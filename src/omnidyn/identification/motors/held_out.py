@@ -20,7 +20,7 @@ from omnidyn.identification.methods import degrees as degrees_of
 from omnidyn.identification.motors.estimate import BAND, LATENCY, OFFSET, MotorEstimate
 from omnidyn.identification.motors.fit import fit_motor, solved
 from omnidyn.identification.motors.log import WORDS, MotorLog
-from omnidyn.identification.motors.problem import MotorEngine, MotorProblem, MotorRecord, motor_problem, motor_record
+from omnidyn.identification.motors.problem import MotorProblem, MotorRecord, motor_problem, motor_record
 from omnidyn.identification.motors.rest import turns_both_ways
 from omnidyn.identification.motors.windows import line_numbers
 from omnidyn.identification.output_error.problem.nuisances import earliest
@@ -142,7 +142,7 @@ class _HeldOut:
         squares, rows = np.zeros((2, BLOCKS, len(problem.columns)))
         for fold in range(FOLDS):
             point = self._without(records, [record_blocks % FOLDS == fold for record_blocks in block], names, full_fit)
-            outputs = MotorEngine(problem).outputs(point)
+            outputs = problem.engine.outputs(point)
             for piece, (predicted, _) in zip(problem.pieces, outputs, strict=True):
                 column_indices = [problem.columns.index(column) for column in piece.record.columns]
                 piece_blocks = block[next(k for k, record in enumerate(records) if record is piece.record)]
@@ -180,7 +180,7 @@ class _HeldOut:
             for record, record_mask in zip(records, held_out_rows, strict=True)
         ]
         problem = _problem(kept_records, names)
-        solver = Solver(problem, MotorEngine(problem), self.degrees)
+        solver = Solver(problem, problem.engine, self.degrees)
         scales = full_fit.state.variance if self.degrees else None
         return solver.minimise(full_fit.state.point, BLOCK_ITERATIONS, scales=scales).state.point
 

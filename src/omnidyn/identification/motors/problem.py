@@ -13,7 +13,7 @@ from omnidyn.identification.motors.estimate import BAND, LAG, LATENCY, OFFSET, S
 from omnidyn.identification.motors.log import CURVE, MEAN, SUB, MotorLog, refined, rows_with
 from omnidyn.identification.output_error.engines.engine import Engine, Weighting
 from omnidyn.identification.output_error.engines.exact import march_piece, padded, used_by
-from omnidyn.identification.output_error.kernel.march import KEEP, PATH, Physics, PhysicsSlopes
+from omnidyn.identification.output_error.kernel.march_sums import KEEP, PATH, Physics, PhysicsSlopes
 from omnidyn.identification.output_error.problem.nuisances import (
     LEAST_LATENCY,
     MOST_LATENCY,
@@ -185,6 +185,11 @@ class MotorProblem(Fitted):
     parameters: tuple[Parameter, ...]
     pieces: tuple[Piece, ...]
 
+    @property
+    def engine(self) -> MotorEngine:
+        """What simulates it, with derivatives."""
+        return MotorEngine(self)
+
 
 class MotorEngine(Engine[MotorProblem]):
     """Residuals and sensitivities of a motor by the exact step."""
@@ -256,7 +261,7 @@ class MotorEngine(Engine[MotorProblem]):
 
 
 def step_numbers(values: FloatArray, at_band: int, room: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """(law (3, 3), its slopes (2, 3, room), drive (3, 1), its slopes (3, 1, room)), as kernel/march.py has them.
+    """(law (3, 3), its slopes (2, 3, room), drive (3, 1), its slopes (3, 1, room)), as kernel/march_sums.py has them.
 
     values: slope, lag, and at `at_band`, if that is not -1, the dead band; slopes are by each of the values.
     """

@@ -19,14 +19,6 @@ from omnidyn.identification.grouping import count_once
 from omnidyn.identification.methods import AUTO, OutputError, degrees
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import ALL_LOGS, begun, group_names
-from omnidyn.identification.output_error.choice import (
-    SCREENING_STEPS,
-    beside_given,
-    best_with_force,
-    better_of,
-    screened,
-    why_white,
-)
 from omnidyn.identification.output_error.conclusion import conclude, loss_words, unexplained
 from omnidyn.identification.output_error.joint import join, joint_start, own_names
 from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
@@ -58,6 +50,14 @@ from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import beside, differences, refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, too_early
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, Trust, trust
+from omnidyn.identification.output_error.written_fit import (
+    SCREENING_STEPS,
+    beside_given,
+    best_with_force,
+    better_of,
+    screened,
+    why_white,
+)
 from omnidyn.model.actuation import GAIN
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot

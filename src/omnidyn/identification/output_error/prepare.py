@@ -11,10 +11,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.engines.engine import Engine
-from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
+from omnidyn.identification.output_error.engines.kinds import Kind, kind_with
 from omnidyn.identification.output_error.problem.differences import differences
 from omnidyn.identification.output_error.problem.friction_laws import BANDS, falls, kept_in_order
 from omnidyn.identification.output_error.problem.nuisances import (
@@ -63,7 +60,6 @@ from omnidyn.simulation.slip.plant import grips
 from omnidyn.statement import WARNING, Statement
 from omnidyn.statistics import difference_noise
 
-Kind = type[Engine[Problem]]  # of an engine
 FINE_TOLERANCE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
 PROBE_CHANGE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
 DRIVE_FACTOR = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
@@ -130,8 +126,9 @@ def make_group(
     axis_motion = motion(records, robot)
     if looped(records):
         question = _loop_question(question, axis_motion, records, robot)
-        return Group(name, records, robot, question, LoopEngine, default_keys, axis_motion.moving_axes, {}, ())
-    engine, bounds, warnings = ExactEngine if exact else ImplicitEngine, {}, []
+        engine = kind_with(has_loop=True)
+        return Group(name, records, robot, question, engine, default_keys, axis_motion.moving_axes, {}, ())
+    engine, bounds, warnings = kind_with(exact=exact), {}, []
     free_keys = question.free if question.free is not None else (*dict.fromkeys((*default_keys, *guesses(robot))),)
     fixed = set(question.fixed)
     for axis in np.flatnonzero(~axis_motion.moving_axes).tolist():
@@ -249,9 +246,7 @@ def make_problem(
 
 def engine_for(records: Sequence[Record], robot: Robot, keys: Sequence[str]) -> Kind:
     """Which engine fits these keys of the robot to the records."""
-    if looped(records):
-        return LoopEngine
-    return ExactEngine if is_exact(robot) and stays_exact(robot, keys) else ImplicitEngine
+    return kind_with(has_loop=looped(records), exact=is_exact(robot) and stays_exact(robot, keys))
 
 
 def stays_exact(robot: Robot, keys: Sequence[str]) -> bool:

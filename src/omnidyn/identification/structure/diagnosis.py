@@ -12,7 +12,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import small_matrices
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
-from omnidyn.identification.output_error.linear.motion import motions
+from omnidyn.identification.output_error.linear.driven_motion import motions
 from omnidyn.identification.output_error.linear.rows import Linear, Rows, solved
 from omnidyn.identification.output_error.linear.sensitivity import effects, with_rounding
 from omnidyn.identification.output_error.linear.workbench import Workbench, scaled

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.output_error.linear.motion import Motion, in_the_room
+from omnidyn.identification.output_error.linear.driven_motion import Motion, in_the_room
 from omnidyn.model.layout import N_AXES, YAW
 
 Directions = Callable[[Motion, FloatArray], FloatArray]  # of a motion and its fastest twist (3,)

@@ -15,7 +15,7 @@ from scipy.special import fdtrc
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Found
-from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.driven_motion import Motion
 from omnidyn.identification.output_error.linear.rows import (
     EIGEN_TOLERANCE,
     TINY,

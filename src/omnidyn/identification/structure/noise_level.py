@@ -24,7 +24,7 @@ from scipy.special import fdtrc
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import HOLDS, NEIGHBOURS, REPEATS, REST, ROUNDING, Binned, Noise
-from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.driven_motion import Motion
 from omnidyn.identification.output_error.linear.rows import TINY, Linear, Rows
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.outputs import SPEEDS, TRAVEL

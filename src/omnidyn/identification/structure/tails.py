@@ -21,7 +21,7 @@ from omnidyn.identification.lack_of_fit import LOSS, Remedy, Wild
 from omnidyn.identification.methods import NU
 from omnidyn.identification.output_error.engines.engine import row_terms
 from omnidyn.identification.output_error.linear.blocks import Blocks
-from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.driven_motion import Motion
 from omnidyn.identification.output_error.linear.rows import solved
 from omnidyn.identification.output_error.problem.problem import Parts, Problem
 from omnidyn.identification.output_error.solve.solver import Solution

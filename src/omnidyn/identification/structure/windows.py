@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.clocks import usual_step
-from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.driven_motion import Motion
 from omnidyn.identification.output_error.linear.rows import TINY, Rows
 from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.logs.plateaus import COMMANDS, command_changes

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.model.actuation import clip_voltage, reaching, voltage_of_duty
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.batch.choice import BOX, DUTY, EXACT, LIMITED
+from omnidyn.simulation.batch.block_march import TOTALS, Record, Rows, march_twist
+from omnidyn.simulation.batch.engine_kind import BOX, DUTY, EXACT, LIMITED
 from omnidyn.simulation.batch.exact import exact_law
 from omnidyn.simulation.batch.fast import fast_law, gauss_two, march_fast
 from omnidyn.simulation.batch.implicit import implicit_law, march_implicit, stages, with_share
 from omnidyn.simulation.batch.limited import alone, distinct_plants, limited_rows, march_limited
-from omnidyn.simulation.batch.march import TOTALS, Record, Rows, march_twist
 from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters, in_blocks, out_of_blocks
 from omnidyn.simulation.batch.pose import gauss_four, march_pose, pose_law
 from omnidyn.simulation.batch.threads import Threads

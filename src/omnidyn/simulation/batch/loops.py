@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.kernel import inlined, kernel
 from omnidyn.model.robot import Robot
+from omnidyn.simulation.batch.block_march import POSE, SPEED, TOTALS, first_failure, keep, load, spoil, store
 from omnidyn.simulation.batch.blocks import (
     IMPLICIT_NAME,
     VOLTS_AT_ONCE,
@@ -26,9 +27,8 @@ from omnidyn.simulation.batch.blocks import (
     put_states,
     shown,
 )
-from omnidyn.simulation.batch.choice import BOX
+from omnidyn.simulation.batch.engine_kind import BOX
 from omnidyn.simulation.batch.implicit import implicit_law, put_push, stages, step_all, with_share
-from omnidyn.simulation.batch.march import POSE, SPEED, TOTALS, first_failure, keep, load, spoil, store
 from omnidyn.simulation.batch.parameters import WIDTH, batch_parameters, in_blocks
 from omnidyn.simulation.batch.pose import ONE, SHARE
 from omnidyn.simulation.batch.threads import Threads

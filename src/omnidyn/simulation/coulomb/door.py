@@ -24,7 +24,7 @@ from omnidyn.simulation.coulomb.law import (
 from omnidyn.simulation.coulomb.run import run_loop, run_rows
 from omnidyn.simulation.coulomb.state import Law, Loop, Rows, Seen, empty_seen, new_work
 from omnidyn.simulation.speed_loop import LoopCommands
-from omnidyn.simulation.way import SAME_TIME
+from omnidyn.simulation.travel import SAME_TIME
 
 MEMORY_BOUNDS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its memory, within these bounds
 SAME_SHARE = 0.1  # of the shortest row: times nearer than this are one, or than SAME_TIME

@@ -37,7 +37,7 @@ from omnidyn.simulation.sensitivity.late_sample import (
     late_samples,
 )
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
-from omnidyn.simulation.way import PATH, PLACE, TURN
+from omnidyn.simulation.travel import PATH, PLACE, TURN
 from omnidyn.statistics import difference_noise
 
 PATH_TOLERANCES = (1e-6, 1e-4)  # [m/s] where a path is fitted, and what a speed is off by adds up

@@ -12,7 +12,7 @@ from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.clocks import usual_step
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.output_error.engines.engine import Engine
-from omnidyn.identification.output_error.linear.motion import Motion, motions
+from omnidyn.identification.output_error.linear.driven_motion import Motion, motions
 from omnidyn.identification.output_error.linear.random_effects import share
 from omnidyn.identification.output_error.linear.rows import Linear, Rows, lengths, solved, solved_by, with_priors
 from omnidyn.identification.output_error.linear.workbench import Workbench

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.output_error.engines.engine import Engine
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
+from omnidyn.identification.output_error.engines.kinds import kind_with
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.outputs import SPEEDS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
@@ -128,11 +128,24 @@ class NearEngine(Engine[Problem]):
         ]
 
 
+def whitened_engine(
+    engine: Engine[Problem], models: Mapping[Column, AutoRegression], moves: Sequence[BoolArray] | None = None
+) -> Engine[Problem]:
+    """The engine with its rows filtered by the memory of each column, see `WhitenedEngine`."""
+    return WhitenedEngine(engine, models, moves)
+
+
+def tangent_at(engine: Engine[Problem], point: Point) -> tuple[Engine[Problem], Sequence[BoolArray]]:
+    """(an engine whose rows are straight near a point, which simulates no more; of each piece the rows that move)."""
+    tangent = TangentEngine(engine, point)
+    return tangent, tangent.moves
+
+
 def near(engine: Engine[Problem], point: Point) -> Engine[Problem]:
     """An engine for a few steps from a point: by a step a row where one with a tolerance simulates, else itself."""
     if engine.tol is None:
         return engine
-    return NearEngine(engine, ImplicitEngine.of(engine.problem), point)
+    return NearEngine(engine, kind_with().of(engine.problem), point)
 
 
 def moving_rows(piece: Piece, residual: FloatArray) -> BoolArray:

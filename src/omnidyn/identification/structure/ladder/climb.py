@@ -23,8 +23,8 @@ from omnidyn.identification.ladder import STANDS, Ladder, Rung
 from omnidyn.identification.output_error.begin import ALL_LOGS
 from omnidyn.identification.output_error.conclusion import unexplained
 from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.linear.driven_motion import motions
 from omnidyn.identification.output_error.linear.free_run import margins_of
-from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.diagnosis import Examined, examine

@@ -16,7 +16,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import CHANGE
-from omnidyn.identification.output_error.linear.motion import Motion, in_the_room
+from omnidyn.identification.output_error.linear.driven_motion import Motion, in_the_room
 from omnidyn.identification.output_error.linear.workbench import Workbench, scaled
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN, Driver

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.driven_motion import Motion
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.structure.missing.candidates import (
     CHANGE,
