@@ -23,7 +23,7 @@ def _numbers_known(statement: Statement) -> str:
     if count == 1:
         return f"{in_words(widest)} is known {within}"
     words = f"{known} {count} numbers are known, the widest ({in_words(widest)}) {within}"
-    return f"{words}; not {names_of(missing)}" if missing else words
+    return f"{words}; not known: {names_of(missing)}" if missing else words
 
 
 def _predicted(held_out: Statement | None) -> str:
