@@ -1,16 +1,20 @@
 """What results say of one subject never excludes itself: statements of real fits, by their codes, not words."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from omnidyn import MotorFit, MotorLine, OutputError, identify, load_robot, simulate
+from benchmarks.blind.log import robot_of
+from benchmarks.wrong_worlds.world import BOX, ELLIPSE, World
+from omnidyn import MotorFit, MotorLine, OutputError, SteadyState, identify, load_robot, simulate
 from omnidyn.statement import PLACES, Statement
 from tests.identification.motors.test_agree import loop, sweep
 from tests.identification.motors.test_held_out import axis, run_of, stairs
 from tests.identification.motors.test_steady_curve import bent, levels, log
 from tests.support.axebot_logs import excitation, noisy_draw
+from tests.support.constant_speeds import ROUND, once
 
 ANSWERS = {"motors_start", "starts_both_ways", "motors_without_dead_band", "motors_no_line", "dead_bands_hardly_known"}
 NO_ANSWER = {"no_motor_answers", "motors_not_answering"}
@@ -38,7 +42,7 @@ EXCLUSIVE = (  # of each pair not both, of one subject
 )
 
 
-def told(statements, parents=()):
+def said_of(statements, parents=()):
     """(subject, code, numbers) of each statement, those inside of others too, of each motor by itself."""
     for statement in statements:
         numbers = statement.numbers
@@ -49,7 +53,7 @@ def told(statements, parents=()):
             if not (statement.code == "motor_held_out_blocks" and numbers.get("written", 0.0) > 0.5):  # of noise
                 yield subject, statement.code, numbers
         inner = [part for value in numbers.values() for part in (value if isinstance(value, tuple) else (value,))]
-        yield from told([part for part in inner if isinstance(part, Statement)], subjects)
+        yield from said_of([part for part in inner if isinstance(part, Statement)], subjects)
 
 
 def of_result(found):
@@ -64,7 +68,7 @@ def of_result(found):
 
 
 def agree(statements):
-    said = [*told(statements)]
+    said = [*said_of(statements)]
     for subject in {subject for subject, _, _ in said}:
         codes = {code for of, code, _ in said if of == subject}
         for some, others in EXCLUSIVE:
@@ -132,6 +136,15 @@ def axebot_fit(seed, **changes):
 )
 def test_of_whole_logs(fit):
     agree(of_result(fit()))
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.25])
+@pytest.mark.parametrize("told", [BOX, ELLIPSE])
+def test_of_constant_speeds(told, factor):
+    """A box of friction, told as it is and as an ellipse, on one floor and on two."""
+    world = World(shape=BOX, **ROUND)
+    run = once(102, world, 20, swept=True, change=17.6, factor=factor)
+    agree(of_result(identify([run], robot_of(replace(world, shape=told)), SteadyState())))
 
 
 def test_pairs_that_exclude_each_other_are_refused():
