@@ -26,7 +26,7 @@ def named_outside(package):
     classes = [
         (file, node) for file, tree in trees.items() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)
     ]
-    engines = {"Engine"}
+    engines = {"FitEngine"}
     for _ in classes:  # an engine of an engine of an engine
         more = {node.name for _, node in classes if bases(node) & engines}
         if more <= engines:
@@ -35,7 +35,7 @@ def named_outside(package):
     found = {}
     for file, tree in trees.items():
         imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names}
-        if names := imported & (engines - {"Engine"}):
+        if names := imported & (engines - {"FitEngine"}):
             found[file] = sorted(names)
     return found
 

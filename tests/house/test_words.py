@@ -12,6 +12,9 @@ PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
 FORBIDDEN = ("way", "known", "told")  # as names of variables, arguments, attributes, functions
 
 
+FORBIDDEN_NAMES, GLUED = 193, 164  # how many there are
+
+
 def forbidden(tree):
     """How many names of a file that it gives are forbidden."""
     return sum(_given(node) in FORBIDDEN for node in ast.walk(tree))
@@ -48,3 +51,10 @@ def names_of_classes_twice(trees):
     """Names that classes of several files have."""
     found = Counter(name for tree in trees for name in {n.name for n in tree.body if isinstance(n, ast.ClassDef)})
     return sorted(name for name, count in found.items() if count > 1)
+
+
+def test_words_get_no_worse():
+    trees = {path: ast.parse(path.read_text("utf-8")) for path in PACKAGE.rglob("*.py")}
+    counts = (sum(map(forbidden, trees.values())), sum(len(glued(path)) for path in trees))
+    assert counts == (FORBIDDEN_NAMES, GLUED), "it rose: choose another name, make it a module; it fell: write it down"
+    assert not names_of_classes_twice(trees.values())

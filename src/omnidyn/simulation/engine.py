@@ -24,7 +24,7 @@ from omnidyn.simulation.exact.inductance import simulate_exact_inductance
 from omnidyn.simulation.implicit.implicit_march import Outcome, capped, march_workspace, run_implicit
 from omnidyn.simulation.slip.plant import slip_plant, wheel_loads
 from omnidyn.simulation.slip.slip_march import SlipOutcome, rolling, run_slipping
-from omnidyn.simulation.speed_loop import LoopCommands, loop_of, no_loop
+from omnidyn.simulation.speed_loop import LoopSettings, loop_of, no_loop
 from omnidyn.simulation.travel import PATH
 from omnidyn.statement import WARNING, Statement
 
@@ -124,7 +124,7 @@ class _SolverRows(NamedTuple):
     dt: FloatArray
     voltage: FloatArray
     bound: FloatArray
-    loop: LoopCommands
+    loop: LoopSettings
     first: Any = slice(None)
     keep: Any = slice(None)
 

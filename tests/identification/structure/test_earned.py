@@ -10,7 +10,7 @@ from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error import fit
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear import blocks as held_out
-from omnidyn.identification.output_error.linear.blocks import Blocks, _without, _without_it, rejected_nuisances
+from omnidyn.identification.output_error.linear.blocks import BlockProducts, _without, _without_it, rejected_nuisances
 from omnidyn.identification.selection.blocks import compare_blocks
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
@@ -76,7 +76,7 @@ def test_the_error_of_blocks_is_that_of_fits_to_all_others():
     columns, residual = rng.standard_normal((count, 4)), rng.standard_normal(count)
     parts = np.split(np.arange(count), 10)
     every = np.column_stack([residual, columns])
-    blocks = object.__new__(Blocks)
+    blocks = object.__new__(BlockProducts)
     blocks.size = np.concatenate([[1.0], np.linalg.norm(columns, axis=0)])
     every = every / blocks.size
     blocks.matrix, blocks.total = np.array([every[own].T @ every[own] for own in parts]), every.T @ every

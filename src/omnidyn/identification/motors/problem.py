@@ -11,7 +11,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.motors.estimate import BAND, LAG, LATENCY, OFFSET, SLOPE
 from omnidyn.identification.motors.log import CURVE, MEAN, SUB, MotorLog, refined, rows_with
-from omnidyn.identification.output_error.engines.engine import Engine, Weighting
+from omnidyn.identification.output_error.engines.engine import FitEngine, Weighting
 from omnidyn.identification.output_error.engines.exact import march_piece, padded, used_by
 from omnidyn.identification.output_error.kernel.march_sums import KEEP, PATH, Physics, PhysicsSlopes
 from omnidyn.identification.output_error.problem.nuisances import (
@@ -22,7 +22,7 @@ from omnidyn.identification.output_error.problem.nuisances import (
     errors_from_rest,
 )
 from omnidyn.identification.output_error.problem.parameters import Parameter
-from omnidyn.identification.output_error.problem.problem import Fitted, Piece, PieceSums, Point
+from omnidyn.identification.output_error.problem.problem import FitProblem, Piece, PieceSums, Point
 from omnidyn.identification.output_error.problem.record import SHORTEST, Record
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.model.actuation import Driver
@@ -179,7 +179,7 @@ SPEED, ANGLE = ("wheel_speed", 0), ("wheel_angle", 0)  # columns
 
 
 @dataclass(frozen=True, eq=False)
-class MotorProblem(Fitted):
+class MotorProblem(FitProblem):
     """parameters: slope, lag, a dead band and an offset where asked for, latencies. pieces: what is fitted to."""
 
     parameters: tuple[Parameter, ...]
@@ -191,7 +191,7 @@ class MotorProblem(Fitted):
         return MotorEngine(self)
 
 
-class MotorEngine(Engine[MotorProblem]):
+class MotorEngine(FitEngine[MotorProblem]):
     """Residuals and sensitivities of a motor by the exact step."""
 
     def __init__(self, problem: MotorProblem):

@@ -31,7 +31,7 @@ from omnidyn.simulation.slip.bounds import (
 )
 from omnidyn.simulation.slip.plant import SlipPlant
 from omnidyn.simulation.slip.stage import SWEEPS, slip_step
-from omnidyn.simulation.speed_loop import LoopCommands, passed, tick_answer, tick_branch
+from omnidyn.simulation.speed_loop import LoopSettings, passed, tick_answer, tick_branch
 
 SHORT_STEP, SHORTEST_STEP, ROUNDING = 1.5e-4, 1e-11, 1e-13  # as in implicit/implicit_march.py
 MOST_STEPS = (1e6, 5e6)  # steps solved at tol 1e-6, and so many more per second
@@ -109,7 +109,7 @@ def run_slipping(
     dt: FloatArray,
     state: FloatArray,
     pose: FloatArray,
-    loop: LoopCommands,
+    loop: LoopSettings,
     tol: float,
 ) -> SlipOutcome:
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: a step a row.

@@ -14,11 +14,19 @@ from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
 from omnidyn.identification.output_error.kernel.march_sums import FINAL, WAVES, add_waves, terms_of
-from omnidyn.identification.output_error.problem.problem import Column, Fitted, Parts, Piece, PieceSums, Point, Problem
+from omnidyn.identification.output_error.problem.problem import (
+    Column,
+    FitProblem,
+    Parts,
+    Piece,
+    PieceSums,
+    Point,
+    Problem,
+)
 from omnidyn.model.actuation import Driver
 from omnidyn.model.layout import N_AXES
 
-P = TypeVar("P", bound=Fitted)
+P = TypeVar("P", bound=FitProblem)
 
 
 @dataclass(frozen=True)
@@ -36,7 +44,7 @@ class Weighting:
     counts_ticks: bool = False
 
 
-class Engine(Generic[P]):
+class FitEngine(Generic[P]):
     """What simulates a problem with its derivatives. A new one:
 
     1. gives `residuals`, or `sums` where rows need not be held, and `on`;
@@ -56,7 +64,7 @@ class Engine(Generic[P]):
     members: Sequence[Any] = ()
 
     @classmethod
-    def of(cls, problem: P, tol: float | None = None) -> Engine[P]:
+    def of(cls, problem: P, tol: float | None = None) -> FitEngine[P]:
         """The engine of this kind that serves a problem. tol [m/s]: of the steps of one that is not exact."""
         raise NotImplementedError
 
@@ -86,7 +94,7 @@ class Engine(Generic[P]):
         return step
 
     @property
-    def unfiltered(self) -> Engine[P]:
+    def unfiltered(self) -> FitEngine[P]:
         """The engine that simulates, whose rows are as they are."""
         return self
 

@@ -17,7 +17,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import side_by_side
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX, Engine, driver_of, late_by
+from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX, FitEngine, driver_of, late_by
 from omnidyn.identification.output_error.engines.exact import HEADING, POSITION, PUSH, TILT
 from omnidyn.identification.output_error.engines.valley import bent
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
@@ -101,7 +101,7 @@ class LastPoints:
         return parts_by_piece
 
 
-class ImplicitEngine(Engine[Problem]):
+class ImplicitEngine(FitEngine[Problem]):
     """Residuals and sensitivities of a problem by the implicit engine. tol [m/s]: its tolerance, None a step a row.
 
     A force that stays in the room is turned by the headings of the log. pushes: whether it knows such forces, and those

@@ -22,8 +22,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.linear.rows import (
     EIGEN_TOLERANCE,
+    FitRows,
     Linear,
-    Rows,
     lengths,
     noise_models,
     with_priors,
@@ -38,7 +38,7 @@ BLOCKS = 10  # of the log, each held out once
 NUISANCE_GAIN = 10.8  # what a likelihood that is sure of a nuisance gains by it: 2 F, by chance once in a thousand logs
 
 
-class Blocks:
+class BlockProducts:
     """Scalar products of [e, J, Z] in blocks of rows. matrix (B, n, n); shows (n,): which columns are not all 0."""
 
     def __init__(self, linear: Linear, *extra_columns: Sequence[FloatArray]):
@@ -60,7 +60,7 @@ class Blocks:
         self.matrix /= np.outer(self.size, self.size)
         self.total /= np.outer(self.size, self.size)
 
-    def of(self, matrix: FloatArray, total: FloatArray) -> Blocks:
+    def of(self, matrix: FloatArray, total: FloatArray) -> BlockProducts:
         """Blocks with other scalar products, of the same rows."""
         other_blocks = copy.copy(self)
         other_blocks.matrix, other_blocks.total = matrix, total
@@ -143,26 +143,26 @@ def _steps(solution: Solution) -> dict[int, float]:
     return steps_by_number
 
 
-def _blocks(solution: Solution) -> Blocks:
+def _blocks(solution: Solution) -> BlockProducts:
     """The fit in blocks of white rows."""
     full_problem = solution.solver.problem
     assert isinstance(full_problem, Problem)
     problem = bounded(full_problem)
     engine = solution.solver.engine.on(problem)
-    rows = Rows.of(problem, solution.state.point, engine.residuals(solution.state.point))
+    rows = FitRows.of(problem, solution.state.point, engine.residuals(solution.state.point))
     slopes = [
         np.where(solution.held_parameters, 0.0, slope) for slope in rows.slopes
     ]  # what a bound holds, holds in every block
     linear = Linear(replace(rows, slopes=slopes), noise_models(rows, rows.residual))
-    return Blocks(linear, [np.zeros((*residual.shape, 0)) for residual in rows.residual])
+    return BlockProducts(linear, [np.zeros((*residual.shape, 0)) for residual in rows.residual])
 
 
-def _without_it(blocks: Blocks, indices: IntArray, j: int, step: float) -> BlockComparison:
+def _without_it(blocks: BlockProducts, indices: IntArray, j: int, step: float) -> BlockComparison:
     """How held-out blocks are predicted without number j, beside with it."""
     return compare_blocks(blocks.held_out(indices), _without(blocks, j, step).held_out(indices[indices != 1 + j]))
 
 
-def _without(blocks: Blocks, j: int, step: float) -> Blocks:
+def _without(blocks: BlockProducts, j: int, step: float) -> BlockProducts:
     """The same blocks where number j has taken this step."""
     turn = np.eye(len(blocks.size))
     turn[1 + j, 0] = -step * blocks.size[1 + j]

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.linear.blocks import BLOCKS, Blocks
-from omnidyn.identification.output_error.linear.rows import Linear, Rows, noise_models
+from omnidyn.identification.output_error.linear.blocks import BLOCKS, BlockProducts
+from omnidyn.identification.output_error.linear.rows import FitRows, Linear, noise_models
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Point, Problem, bounded
@@ -88,7 +88,7 @@ def free_run(
     pieces = [replace(piece, margin=margin) for piece, margin in zip(full_problem.pieces, margins, strict=True)]
     problem = bounded(replace(full_problem, pieces=tuple(pieces)))
     point = solution.state.point if values is None else Point(values, solution.state.point.states)
-    rows = Rows.of(problem, point, solution.solver.engine.unfiltered.on(problem).residuals(point))
+    rows = FitRows.of(problem, point, solution.solver.engine.unfiltered.on(problem).residuals(point))
     held_parameters = solution.held_parameters if values is None else np.ones(len(solution.held_parameters), bool)
     rows = replace(rows, slopes=[np.where(held_parameters, 0.0, slopes) for slopes in rows.slopes])
     white = noise_models(rows, rows.residual, order_limit=0)
@@ -101,7 +101,7 @@ def free_run(
     steps, tail_step = np.zeros((BLOCKS, slopes.shape[1])), np.zeros(slopes.shape[1])
     indices = 1 + np.flatnonzero(np.any(slopes != 0.0, axis=0))
     if indices.size:
-        blocks = Blocks(
+        blocks = BlockProducts(
             Linear(rows, models), [np.zeros((*column_residuals.shape, 0)) for column_residuals in rows.residual]
         )
         for b in range(BLOCKS):
@@ -136,10 +136,10 @@ def _places(linear: Linear) -> tuple[IntArray, IntArray]:
         column.append(np.concatenate([of_rows, np.full(linear.length(k) - len(of_rows), -1)]))
     column.append(np.full(len(rows.problem.parameters), -1))
     column_of_row = np.concatenate(column)
-    return np.where(column_of_row >= 0, Blocks.numbers(linear), -1), column_of_row
+    return np.where(column_of_row >= 0, BlockProducts.numbers(linear), -1), column_of_row
 
 
-def _spread(rows: Rows) -> FloatArray:
+def _spread(rows: FitRows) -> FloatArray:
     """Standard deviation of what was measured of each column in the rows that count. Shape (C,)."""
     values: list[list[FloatArray]] = [[] for _ in rows.problem.columns]
     for piece, mask, columns in zip(rows.pieces, rows.masks, rows.column, strict=True):

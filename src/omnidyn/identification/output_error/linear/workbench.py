@@ -11,7 +11,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.output_error.engines.kinds import Kind, kind_with
-from omnidyn.identification.output_error.linear.driven_motion import Motion
+from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
@@ -31,7 +31,7 @@ class Workbench:
     problem: Problem
     point: Point
     kind: Kind
-    motions: Sequence[Motion]
+    motions: Sequence[DrivenMotion]
     moments: Sequence[float] = ()
     _before: dict[Kind, list[FloatArray]] = field(default_factory=dict)
 
@@ -63,11 +63,11 @@ class Workbench:
         values = on_time(self.problem.parameters, self.point.values)
         return replace(self, point=replace(self.point, values=values), _before={})
 
-    def by_force(self, force: Callable[[Motion], FloatArray]) -> list[FloatArray]:
+    def by_force(self, force: Callable[[DrivenMotion], FloatArray]) -> list[FloatArray]:
         """What forces (n, K, 3) on the body show. Of each piece (C, rows, K)."""
         return self.by_forces([force])[0]
 
-    def by_forces(self, forces: Sequence[Callable[[Motion], FloatArray]]) -> list[list[FloatArray]]:
+    def by_forces(self, forces: Sequence[Callable[[DrivenMotion], FloatArray]]) -> list[list[FloatArray]]:
         """What each of several forces shows: in one go through the rows, which takes hardly longer than one of them."""
         columns_by_force: list[list[FloatArray]] = [[] for _ in forces]
         for motion in self.motions:

@@ -32,7 +32,7 @@ from scipy.special import chdtri
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.parallel import side_by_side
-from omnidyn.identification.output_error.engines.engine import Engine
+from omnidyn.identification.output_error.engines.engine import FitEngine
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
 from omnidyn.identification.output_error.memory.innovations import without_gaps
 from omnidyn.identification.output_error.memory.whitened import (
@@ -161,7 +161,7 @@ def _straight(
 
 def _filtered(
     solver: Solver[Problem],
-    engine: Engine[Problem],
+    engine: FitEngine[Problem],
     models: Mapping[Column, AutoRegression],
     precision: float,
     moves: Sequence[BoolArray] | None = None,

@@ -9,7 +9,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import side_by_side
-from omnidyn.identification.output_error.engines.engine import Engine
+from omnidyn.identification.output_error.engines.engine import FitEngine
 from omnidyn.identification.output_error.engines.kinds import kind_with, rolling_engine
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TRAVELS
 from omnidyn.identification.output_error.problem.parameters import AT
@@ -125,7 +125,7 @@ def _on_time(problem: Problem) -> Problem:
     return replace(problem, parameters=tuple(parameters))
 
 
-class Rates(Engine[Problem]):
+class Rates(FitEngine[Problem]):
     """An engine, of headings, positions and angles of wheels their differences alone.
 
     A path keeps what went wrong long ago: one turn too far spoils all that follows, and a later error that takes a part
@@ -133,7 +133,7 @@ class Rates(Engine[Problem]):
     the slow numbers, for the noise of neighbours is one and the same: it is where to start, not where to end.
     """
 
-    def __init__(self, engine: Engine[Problem]):
+    def __init__(self, engine: FitEngine[Problem]):
         self.problem, self._engine = engine.problem, engine
 
     def on(self, problem: Problem) -> Rates:

@@ -17,7 +17,7 @@ from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.engines.engine import Engine
+from omnidyn.identification.output_error.engines.engine import FitEngine
 from omnidyn.identification.output_error.engines.kinds import Kind, kind_with
 from omnidyn.identification.output_error.linear.workbench import on_time
 from omnidyn.identification.output_error.prepare import (
@@ -28,7 +28,7 @@ from omnidyn.identification.output_error.prepare import (
 from omnidyn.identification.output_error.problem.nuisances import PUSH
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
-from omnidyn.identification.structure.missing.candidates import CHANGE, Candidate, Fitted, Trial
+from omnidyn.identification.structure.missing.candidates import CHANGE, Candidate, FittedCandidate, Trial
 from omnidyn.identification.structure.missing.switches import Switch, as_fitted, simpler_first, switches
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 
@@ -110,7 +110,7 @@ def _question(problem: Problem) -> OutputError:
     return OutputError(free=problem.names[: problem.robot_count], nuisances=problem.names[problem.robot_count :])
 
 
-class _Coarse(Engine[Problem]):
+class _Coarse(FitEngine[Problem]):
     """An engine by a step a row, or a tick, three times as fast, and what that was off by in the fit before."""
 
     def __init__(self, problem: Problem, kind: Kind, coarse_errors: Sequence[FloatArray]):
@@ -188,7 +188,9 @@ def _trial(refit: _Refit, problem: Problem, parts: Sequence[Parts], solution: So
         name: (values_before[name], value[name]) for name in problem.names[: problem.robot_count] if name in value
     }
     numbers = max(len(new_problem.parameters) - len(problem.parameters) + refit.way.numbers, 1)
-    return Trial(columns_by_piece, fitted=Fitted(as_fitted(refit.way.cause, values_before, value), numbers, changes))
+    return Trial(
+        columns_by_piece, fitted=FittedCandidate(as_fitted(refit.way.cause, values_before, value), numbers, changes)
+    )
 
 
 def _values(problem: Problem, solution: Solution) -> dict[str, float]:

@@ -14,8 +14,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Remedy
-from omnidyn.identification.output_error.linear.blocks import Blocks
-from omnidyn.identification.output_error.linear.rows import Linear, Rows
+from omnidyn.identification.output_error.linear.blocks import BlockProducts
+from omnidyn.identification.output_error.linear.rows import FitRows, Linear
 from omnidyn.identification.selection.blocks import compare_blocks
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial
 from omnidyn.model.actuation import GAIN
@@ -57,7 +57,7 @@ def remedies(
     flat = [(candidate, trial) for candidate, trials in candidate_trials for trial in trials]
     if not flat:
         return ()
-    blocks = Blocks(linear, *(trial.columns_by_piece for _, trial in flat), theme_columns)
+    blocks = BlockProducts(linear, *(trial.columns_by_piece for _, trial in flat), theme_columns)
     themes = np.arange(len(blocks.size) - theme_columns[0].shape[2], len(blocks.size))
     parameter_indices = np.arange(1, 1 + blocks.count)
     base, first, best = blocks.left(parameter_indices), 1 + blocks.count, {}
@@ -135,7 +135,7 @@ def _best_first(ranking: Sequence[tuple[Remedy, FloatArray]]) -> list[Remedy]:
     return [*sorted(better_remedies, key=lambda r: -r.gain), *others]
 
 
-def _changes(rows: Rows, result: Tried) -> dict[str, tuple[float, float]]:
+def _changes(rows: FitRows, result: Tried) -> dict[str, tuple[float, float]]:
     """Number of the robot -> (what it is, what it would be beside a candidate), to first order; none for a candidate
     that takes the place of what these numbers belong to."""
     if result.candidate.key in (BODY_AXES, DIRECTION):
@@ -149,7 +149,12 @@ def _changes(rows: Rows, result: Tried) -> dict[str, tuple[float, float]]:
 
 
 def _same(
-    blocks: Blocks, parameter_indices: IntArray, base: float, noise: float, left_result: Tried, right_result: Tried
+    blocks: BlockProducts,
+    parameter_indices: IntArray,
+    base: float,
+    noise: float,
+    left_result: Tried,
+    right_result: Tried,
 ) -> bool:
     """Whether the log cannot tell two apart: as good as each other, and both hardly better than one."""
     joint_gain = (
