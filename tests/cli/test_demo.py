@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from omnidyn.cli import main
-from omnidyn.cli.demo import MARKER, check_folder, write_folder
+from omnidyn.cli.demo_folder import MARKER, check_folder, write_folder
 from omnidyn.cli.terminal.streams import width
 from omnidyn.errors import InputError
 from omnidyn.paper.claim import ClaimVerdict

@@ -16,8 +16,8 @@ from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.read_log import read_log
 from omnidyn.logs.readers import text
 from omnidyn.logs.readers.read_table import read_table
-from omnidyn.logs.readers.ros.layout import parse_definition
-from omnidyn.logs.readers.wpilog import leaves_of
+from omnidyn.logs.readers.ros.definitions import parse_definition
+from omnidyn.logs.readers.wpilib_structs import leaves_of
 from omnidyn.logs.run_file import write_run
 from omnidyn.logs.table import dialect
 from omnidyn.logs.table.dialect import MAX_NAME

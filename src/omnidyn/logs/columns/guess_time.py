@@ -14,7 +14,8 @@ from omnidyn.logs.channels import TIME
 from omnidyn.logs.clock.clock import are_steps, is_dates
 from omnidyn.logs.column import Column
 from omnidyn.logs.columns import names as words
-from omnidyn.logs.columns.guessed import UNIT, Guess, doubt, first_word, floats, is_numeric
+from omnidyn.logs.columns.doubts import UNIT, doubt
+from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.table.table import FileTable

@@ -30,7 +30,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import one_by_one
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.keys import Key
-from omnidyn.model.known.told import SIGNED, Told, holding, is_log, numbers_told, told
+from omnidyn.model.known.breakaway_levels import holding
+from omnidyn.model.known.told import SIGNED, Told, is_log, numbers_told, told
 from omnidyn.model.robot import Robot
 
 DRAWS = 100

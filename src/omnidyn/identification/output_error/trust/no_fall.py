@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.solve.steps import Order
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, LIMIT
-from omnidyn.identification.output_error.trust.support import at_the_end
+from omnidyn.identification.output_error.trust.search_ends import at_the_end
 from omnidyn.identification.output_error.trust.uncertainty import RISE, Trust
 from omnidyn.statement import WARNING, Statement
 
