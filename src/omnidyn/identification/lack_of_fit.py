@@ -9,6 +9,7 @@ from typing import Any
 
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Part, Points, Table, all_of, plain, short
+from omnidyn.identification.selection.blocks import BlockComparison
 from omnidyn.identification.stability import Stability
 from omnidyn.model.keys import in_words
 from omnidyn.statement import NOTE, WARNING, Statement, statements
@@ -107,8 +108,9 @@ class Remedy:
     gain: share of the squared held-out error that it takes away, with its standard error. same_as: keys that the
     log cannot tell from it. share: of all that residuals hold beside noise, that it explains. offered: whether a
     robot file or a fit holds such. chi2: by how much it lowers the sum of squares, in those of the noise; numbers:
-    how many it fits. size, at: its fitted change and where it was tried, both of a first step. changes: number ->
-    (what it is, what it would be with it, to first order). force: where it was fitted to forces at steady state."""
+    how many it fits. comparison: how held-out blocks are predicted with it. size, at: its fitted change and where it
+    was tried, both of a first step. changes: number -> (what it is, what it would be with it, to first order). force:
+    where it was fitted to forces at steady state."""
 
     key: str
     cause: Statement
@@ -123,6 +125,7 @@ class Remedy:
     at: float = 0.0
     changes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     force: Force | None = None
+    comparison: BlockComparison | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cause", *statements([self.cause]))

@@ -262,8 +262,8 @@ SENTENCES = {
     "slope_may_be_zero": Sentence(_slope_may_be_zero),
     "dead_band_not_needed": Sentence(_dead_band_not_needed),
     "held_out_no_better": Sentence(
-        "{subject}: held-out logs are predicted no better with its dead band (error {written:.4g} {travel}/s, "
-        "{plain:.4g} by slope and lag alone): it may be an effect of something else"
+        "{subject}: held-out logs are predicted no better with its dead band ({better} of {blocks} blocks are; error "
+        "{written:.4g} {travel}/s, {plain:.4g} by slope and lag alone): it may be an effect of something else"
     ),
     "motor_held_out_blocks": Sentence(_held_out_blocks),
     "dead_band_rejected": Sentence(
@@ -271,7 +271,7 @@ SENTENCES = {
             "blocks",
             "no dead band is kept: {better} of {blocks} held-out blocks are predicted better with one, no more than by "
             "chance; it is at most {high:.3g} {unit}",
-            "no dead band is kept: held-out blocks are predicted as well without; it is at most {high:.3g} {unit}",
+            "no dead band is kept: these logs do not tell it from 0; it is at most {high:.3g} {unit}",
         )
     ),
     "offset_as_friction": Sentence(_offset_as_friction),

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from omnidyn.document import all_of, both
-from omnidyn.identification.steady.choice import NOT_COMPARED, SHAPE_ERRORS
+from omnidyn.identification.selection.blocks import LIMIT_ERRORS
+from omnidyn.identification.steady.choice import NOT_COMPARED
 from omnidyn.identification.steady.operating_points import ANGLE, FORCES, SPEEDS
 from omnidyn.identification.steady.shapes import SHAPES
 from omnidyn.model.keys import Key, unit
@@ -226,7 +227,7 @@ def _rests_on_back_emf(statement: Statement) -> str:
 
 def _more_directions(statement: Statement) -> str:
     """How many more runs would tell two shapes apart."""
-    factor = (SHAPE_ERRORS / statement.numbers["apart"]) ** 2
+    factor = (LIMIT_ERRORS / statement.numbers["apart"]) ** 2
     amount = (
         f"about {math.ceil(factor)} times as many runs" if factor < PRACTICAL else "far more runs than is practical"
     )

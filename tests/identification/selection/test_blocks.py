@@ -11,10 +11,12 @@ from tests.support.held_out_blocks import errors_of_blocks
 @pytest.mark.parametrize("count", [4, 10, 20])
 def test_p_is_that_of_scipy(count):
     for seed in range(20):
-        ratio = np.random.default_rng(seed).normal(0.3, 1.0, count)
-        comparison = compare_blocks(np.exp(ratio), np.ones(count))
+        without, with_effect = np.exp(np.random.default_rng(seed).normal([[0.3], [0.0]], 1.0, (2, count)))
+        comparison = compare_blocks(without, with_effect)
+        middle = np.median(np.minimum(without, with_effect))
+        ratio = np.log((without + middle) / (with_effect + middle))
         p = ttest_rel(ratio, np.zeros(count), alternative="greater").pvalue
-        assert comparison.p == pytest.approx(max(p, 0.5**count), abs=1e-12)
+        assert comparison.p == pytest.approx(np.clip(p, 0.5**count, 1.0 - 0.5**count), abs=1e-12)
 
 
 @pytest.mark.parametrize("count", [1, 5, 10, 24])
@@ -31,8 +33,25 @@ def test_two_blocks_decide_nothing():
     assert compare_blocks([1.0, 1.0, 1.0], [0.1, 0.1, 0.1001]).is_better
 
 
-def test_the_gain_is_the_geometric_mean():
-    assert compare_blocks([1.0, 1.0], [0.5, 0.125]).gain == pytest.approx(0.75)
+@pytest.mark.parametrize("share", [0.2, 0.9, 1.0, 3.0])
+def test_the_gain_is_the_share_of_the_squared_error_that_every_block_loses(share):
+    without = np.random.default_rng(0).uniform(1.0, 1.001, 10)
+    assert compare_blocks(without, share * without).gain == pytest.approx(1.0 - share, abs=2e-3)
+
+
+def test_a_block_that_is_quiet_by_chance_does_not_decide():
+    """A hundredth of an ordinary error in one block of ten, which is a hundred times as small without the effect."""
+    without, with_effect = np.ones(10), np.where(np.arange(10) < 8, 0.8, 1.05)
+    without[9], with_effect[9] = 1e-4, 1e-2
+    assert compare_blocks(without, with_effect).is_better
+
+
+def test_a_clear_gain_is_a_tenth_of_the_squared_error():
+    without = np.linspace(1.0, 1.01, 10)
+    assert compare_blocks(without, 0.89 * without).is_clear
+    comparison = compare_blocks(without, 0.91 * without)
+    assert comparison.is_better
+    assert not comparison.is_clear
 
 
 def test_one_block_that_rules_the_sum_does_not_rule_the_answer():
@@ -66,6 +85,21 @@ def test_equal_errors_and_no_errors_tell_nothing():
 def test_errors_that_differ_by_rounding_are_equal():
     values = 1.0 + 1e-13 * np.arange(10)
     assert compare_blocks(values, np.ones(10)).p == 1.0
+
+
+def test_errors_of_0_to_rounding_tell_nothing():
+    """A square that is computed by differences may be below 0."""
+    zeros = 1e-18 * np.random.default_rng(0).standard_normal((2, 9))
+    comparison = compare_blocks(np.append(zeros[0], 1.0), np.append(zeros[1], 0.9))
+    assert comparison.better == 1
+    assert not comparison.is_better
+
+
+def test_the_standard_error_is_that_of_the_ratios():
+    """By the rule of propagation of errors: where the gain is small, all of it is 1 - exp(-ratio)."""
+    ratio = np.random.default_rng(5).normal(0.1, 0.02, 10)
+    comparison = compare_blocks(np.exp(ratio), np.ones(10))
+    assert comparison.std == pytest.approx(np.exp(-ratio.mean()) * ratio.std(ddof=1) / np.sqrt(10), rel=0.02)
 
 
 def found(effect, count, logs=1000, **kind):

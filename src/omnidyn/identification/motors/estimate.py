@@ -20,7 +20,6 @@ from omnidyn.statement import NOTE, WARNING, Statement
 
 SLOPE, BAND, OFFSET, LAG, INERTIA, LATENCY = "slope", "dead_band", "offset", "lag", "inertia", "latency"
 WINDOWS, FREE_RUN = "windows", "free run"
-PAYS = 0.01  # share by which the error on held-out logs must fall for a dead band to pay
 LATE_ROWS = 2.0  # rows: a drive that is later is rare
 HEAD = (
     "motor",
@@ -52,6 +51,7 @@ class MotorEstimate:
     does not resolve the input there. one_way: it turned one way only, so a dead band and an offset of the input are
     one. held_out [rad/s]: error of free runs on logs that were not fitted. source: the logs. answers: whether its
     speed goes with its input. travel: "rad", or "m" of a linear axis: what stands here in rad is in that.
+    on_held_out: of blocks of these logs with those that slope and lag alone leave.
     rejected: numbers that held-out blocks do not need, with their intervals; comparisons: of them, by these blocks.
     Of windows: rest, the largest input under which the motor stayed at rest, NaN where it never rested; draws: of the
     bootstrap, by name. Of a free run: between, noise by channel, kind of the covariance, whether the fit converged.
@@ -82,6 +82,7 @@ class MotorEstimate:
     converged: bool = True
     answers: bool = True
     blocks: HeldOut | None = None
+    on_held_out: BlockComparison | None = None
     rejected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     comparisons: Mapping[str, BlockComparison] = field(default_factory=dict)
     travel: str = "rad"

@@ -2,7 +2,8 @@
 
 The rows are cut into blocks of equal length. A fifth of them at a time has no outputs for a fit, and is predicted by
 its free run, which goes on through them under the input of the log. Of dead band, offset and latency the one is left
-out that held-out rows need least, as long as the blocks do not need it by more than chance (`compare_blocks`).
+out that held-out rows need least, as long as the blocks do not need it by more than chance (`compare_blocks`). A dead
+band or an offset whose interval reaches 0 is left out as well: the likelihood stands beside the blocks.
 """
 
 from __future__ import annotations
@@ -68,13 +69,21 @@ class ModelChoice:
 
 
 def choose_model(
-    logs: Sequence[MotorLog], motor: int, between: str, loss: str, wanted_names: Sequence[str] | None = None
+    logs: Sequence[MotorLog],
+    motor: int,
+    between: str,
+    loss: str,
+    wanted_names: Sequence[str] | None = None,
+    unseen: Sequence[str] = (),
 ) -> ModelChoice | None:
     """What a motor needs; None where the logs are too short to hold any block out.
 
     wanted_names: of NUMBERS, all of which are taken; None: those that pay. between, loss: as `fit_motor` has them.
+    unseen: those that are not taken, for their intervals reach 0.
     """
-    candidate_names = tuple(name for name in NUMBERS if wanted_names is None or name in wanted_names)
+    candidate_names = tuple(
+        name for name in NUMBERS if (wanted_names is None or name in wanted_names) and name not in unseen
+    )
     if not turns_both_ways(logs, motor):
         candidate_names = tuple(name for name in candidate_names if name != OFFSET)
     held_out = _HeldOut(logs, motor, degrees_of(loss))
@@ -235,9 +244,14 @@ def written_and_plain(logs: Sequence[MotorLog], motor: int, method: MotorFit) ->
 
     if choice is None:
         return fit(wanted_names or (BAND,), None), fit((), None)
+    written_fit = fit(choice.model.names, choice.model)
+    unseen: dict[str, tuple[float, float]] = {}
+    while wanted_names is None and (reaching := _reaching_zero(written_fit, choice.model.names)):
+        unseen |= reaching
+        choice = choose_model(logs, motor, method.between, method.loss, unseen=tuple(unseen)) or choice
+        written_fit = fit(choice.model.names, choice.model)
     model, plain_model = choice.model, choice.plain_model
-    written_fit = fit(model.names, model)
-    intervals = {name: _interval(fit((*model.names, name), model), name) for name in choice.rejected}
+    intervals = unseen | {name: _interval(fit((*model.names, name), model), name) for name in choice.rejected}
     blocks = HeldOut(model.size, plain_model.size, comparison=model.beside(plain_model) if model.names else None)
     notes = tuple(written_fit.late_statements(min(log.step for log in logs)))
     follows_input = blocks.written < ANSWERS
@@ -251,6 +265,12 @@ def written_and_plain(logs: Sequence[MotorLog], motor: int, method: MotorFit) ->
         answers=written_fit.answers or follows_input,
         warnings=(*written_fit.warnings, *notes),
     ), fit((), plain_model)
+
+
+def _reaching_zero(fit: MotorEstimate, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """The dead band and the offset that a fit does not tell from 0, with their intervals: the first of them."""
+    ends = {name: fit.ci95[name] for name in (OFFSET, BAND) if name in names}
+    return dict([item for item in ends.items() if item[1][0] <= 0.0 <= item[1][1]][:1])
 
 
 def _interval(fit: MotorEstimate, name: str) -> tuple[float, float]:

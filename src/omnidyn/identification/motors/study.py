@@ -17,8 +17,8 @@ from omnidyn.findings.fitness import MOTORS as MOTORS_USE
 from omnidyn.identification.grouping import held_out
 from omnidyn.identification.log_verdicts import checked, log_verdicts, of_motors, told_why, unfit, verdict_advice
 from omnidyn.identification.methods import OUTPUT_ERROR, STEADY_STATE, MotorFit, MotorLine
-from omnidyn.identification.motors.choice import fit_rmse
-from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
+from omnidyn.identification.motors.choice import block_errors, fit_rmse
+from omnidyn.identification.motors.estimate import HEAD, MotorEstimate, named
 from omnidyn.identification.motors.fit import logs_of_free_runs
 from omnidyn.identification.motors.held_out import written_and_plain
 from omnidyn.identification.motors.log import (
@@ -50,6 +50,7 @@ from omnidyn.identification.motors.steady_curve import (
 )
 from omnidyn.identification.motors.window_fit import fit_line
 from omnidyn.identification.motors.windows import MotorWindows, motor_windows
+from omnidyn.identification.selection.blocks import compare_blocks
 from omnidyn.logs.log import Log
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.robot import Robot
@@ -114,10 +115,11 @@ class MotorStudy(Displayable):
         motor_statements += [curve.statement() for curve in self.curves]
         motor_statements += [statement for motor in self.motors if (statement := motor.of_blocks())]
         for estimate in self.motors:
-            plain_motor = self._plain_of(estimate)
-            if plain_motor and estimate.dead_band_seen and estimate.held_out > (1.0 - PAYS) * plain_motor.held_out:
+            plain_motor, comparison = self._plain_of(estimate), estimate.on_held_out
+            if plain_motor and comparison and estimate.dead_band_seen and not comparison.is_better:
                 errors = {"written": estimate.held_out, "plain": plain_motor.held_out, "travel": estimate.travel}
-                motor_statements.append(Statement("held_out_no_better", WARNING, estimate.name, errors))
+                numbers = errors | comparison.counts
+                motor_statements.append(Statement("held_out_no_better", WARNING, estimate.name, numbers))
         return (
             *motor_statements,
             *(start.statement() for start in self.starts),
@@ -345,8 +347,12 @@ def _free_runs(runs: Sequence[Run], method: MotorFit, hold_out: Sequence[str], p
     pairs = []
     for motor in motors:
         progress(Report(f"fitting motor {motor + 1} of {len(motors)}"))
-        fits = written_and_plain(logs, motor, method)
-        pairs.append([replace(fit, held_out=fit_rmse(fit, held_out_runs)) if held_out_runs else fit for fit in fits])
+        written, plain = written_and_plain(logs, motor, method)
+        if held_out_runs:
+            comparison = compare_blocks(*(block_errors(fit, held_out_runs) for fit in (plain, written)))
+            written = replace(written, held_out=fit_rmse(written, held_out_runs), on_held_out=comparison)
+            plain = replace(plain, held_out=fit_rmse(plain, held_out_runs))
+        pairs.append((written, plain))
     bands, plain_motors = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
     slow = is_slow(logs)

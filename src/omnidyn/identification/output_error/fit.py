@@ -309,13 +309,17 @@ class Fit:
             kept_names = supported(
                 solution.solver, solution, (LATENCY,) if group.engine.has_loop else automatic(group.records)
             )
-        rejected_names = rejected_nuisances(solution) if not group.engine.has_loop else ()
-        kept_names = tuple(name for name in kept_names if name not in rejected_names)
+        rejected = rejected_nuisances(solution) if not group.engine.has_loop else {}
+        kept_names = tuple(name for name in kept_names if name not in rejected)
         lost = [name for name in solution.solver.problem.nuisances if name not in kept_names]
         if not lost:
             return self._chosen(solution, progress)
         notes = tuple(implausible(name, value, fitted=False) for name, value in early.items())
-        notes += tuple(Statement("harmful_nuisance", WARNING, name) for name in rejected_names if name not in early)
+        notes += tuple(
+            Statement("harmful_nuisance", WARNING, name, comparison.counts)
+            for name, comparison in rejected.items()
+            if name not in early
+        )
         if group.engine.has_loop:  # from its start on: until it is done, the fit with all of them is the best so far
             progress = progress.aside(f"once more without {', '.join(lost)}")
         simpler_solution = self._solve(group, group.problem(kept_names), progress, solution)

@@ -25,6 +25,7 @@ from omnidyn.identification.output_error.linear.driven_motion import DrivenMotio
 from omnidyn.identification.output_error.linear.rows import solved
 from omnidyn.identification.output_error.problem.problem import Parts, Problem
 from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.selection.blocks import compare_blocks
 from omnidyn.identification.structure.misfit import Misfit
 from omnidyn.model.mass import mass_matrix
 from omnidyn.statement import NOTE, Statement
@@ -117,10 +118,10 @@ def calmer(misfit_result: Misfit, outliers_by_output: Mapping[str, Wild]) -> tup
         )
         plain_losses.append(plain_loss)
         robust.append(robust_loss)
-    change = (np.array(plain_losses) - robust) / max(sum(plain_losses), 1e-300)
+    comparison = compare_blocks(plain_losses, robust)
     percent = 100.0 * max(outliers.share for outliers in outliers_by_output.values())
     cause = Statement("outliers", NOTE, numbers={"percent": percent})
-    return (Remedy(LOSS, cause, float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change))), share=0.0),)
+    return (Remedy(LOSS, cause, comparison.gain, comparison.std, share=0.0, comparison=comparison),)
 
 
 def _students(columns: FloatArray, e: FloatArray, start_coefficients: FloatArray, scale: float) -> FloatArray:

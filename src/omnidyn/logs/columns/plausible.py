@@ -14,7 +14,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.logs.columns.doubts import UNIT, Doubt, doubt, letter_of
 from omnidyn.units import Unit, parse_unit
 
-USUAL_SHARE = 0.99  # of the values: some are outliers, or codes of a driver
+USUAL_SHARE = 0.99  # of the distinct values: some are outliers, or codes of a driver, however often they are repeated
 
 
 class UsualRange(NamedTuple):
@@ -67,7 +67,7 @@ def beyond_range(
     a unit that is given is right, a robot says better than a range (`check`), but for its supply.
     """
     letter = letter_of(component.removesuffix("_cmd"))
-    limits, values = RANGES.get(letter), values[np.isfinite(values)]
+    limits, values = RANGES.get(letter), np.unique(values[np.isfinite(values)])
     judged = limits is LENGTH or (limit is not None and letter != "supply")
     if limits is None or not values.size or (is_given and judged):
         return None

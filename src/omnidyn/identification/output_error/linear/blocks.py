@@ -7,8 +7,8 @@ stretch makes them worse. So each of which the likelihood is sure is asked for t
 one linear step from the fit to all, as in ladder/held_out.py.
 
 In doubt a nuisance stays: one that is there and not fitted moves friction by 10 to 40 %, past every interval, and one
-that is fitted and not there costs what the intervals say. It must go where leaving it out lowers the error of those
-blocks by more than its standard error. A gain always stays: a supply that is only nominal is in the intervals by it.
+that is fitted and not there costs what the intervals say. It must go where those blocks are predicted better without
+it (`compare_blocks`). A gain always stays: a supply that is only nominal is in the intervals by it.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from omnidyn.identification.output_error.linear.rows import (
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Normal, Solution
+from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 from omnidyn.model.actuation import DEAD_BAND
 
 BLOCKS = 10  # of the log, each held out once
@@ -108,22 +109,22 @@ class BlockProducts:
         return self.held_out(indices)
 
 
-def rejected_nuisances(solution: Solution) -> tuple[str, ...]:
-    """The names of the latencies and the dead band that a fit is sure of, and blocks beside it are better without."""
+def rejected_nuisances(solution: Solution) -> dict[str, BlockComparison]:
+    """The latencies and the dead band that a fit is sure of, and held-out blocks are better without; how they are."""
     steps = _steps(solution)
     if not steps:
-        return ()
+        return {}
     blocks, problem = _blocks(solution), solution.solver.problem
     indices = 1 + np.flatnonzero(~solution.held_parameters)
-    lost: list[int] = []
+    rejected: dict[str, BlockComparison] = {}
     while steps:
-        harm_by_number = {j: _harm(blocks, indices, j, step) for j, step in steps.items()}
-        most_harmful = max(harm_by_number, key=lambda j: harm_by_number[j])
-        if harm_by_number[most_harmful] <= 1.0:
+        comparisons = {j: _without_it(blocks, indices, j, step) for j, step in steps.items()}
+        most_harmful = min(comparisons, key=lambda j: comparisons[j].p)
+        if not comparisons[most_harmful].is_better:
             break
         blocks, indices = _without(blocks, most_harmful, steps.pop(most_harmful)), indices[indices != 1 + most_harmful]
-        lost.append(most_harmful)
-    return tuple(problem.parameters[j].name for j in lost)
+        rejected[problem.parameters[most_harmful].name] = comparisons[most_harmful]
+    return rejected
 
 
 def _steps(solution: Solution) -> dict[int, float]:
@@ -156,10 +157,9 @@ def _blocks(solution: Solution) -> BlockProducts:
     return BlockProducts(linear, [np.zeros((*residual.shape, 0)) for residual in rows.residual])
 
 
-def _harm(blocks: BlockProducts, indices: IntArray, j: int, step: float) -> float:
-    """By how many standard errors the error of blocks that are left out is lower without number j."""
-    change = blocks.held_out(indices) - _without(blocks, j, step).held_out(indices[indices != 1 + j])
-    return float(change.sum() / max(change.std(ddof=1) * np.sqrt(len(change)), 1e-300))
+def _without_it(blocks: BlockProducts, indices: IntArray, j: int, step: float) -> BlockComparison:
+    """How held-out blocks are predicted without number j, beside with it."""
+    return compare_blocks(blocks.held_out(indices), _without(blocks, j, step).held_out(indices[indices != 1 + j]))
 
 
 def _without(blocks: BlockProducts, j: int, step: float) -> BlockProducts:

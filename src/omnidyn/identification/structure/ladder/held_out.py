@@ -18,6 +18,7 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.output_error.problem.decimated import Decimated
 from omnidyn.identification.output_error.problem.problem import Parts, Point, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 from omnidyn.identification.structure.tails import as_counted
 
 Shows = Callable[[Point], list[Parts]]
@@ -26,7 +27,6 @@ SIMULATION_RATIO = (
     1.5  # times what a fit to all leaves of a block, from which the error by a fit to all others is simulated
 )
 SHARES = (1.0, 0.5, 0.25, 0.125)  # of a step that are tried
-GAIN_ERRORS = 1.0  # standard errors of its gain by which a step must pay
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +51,9 @@ class Errors:
             n * np.log(max(self.square, 1e-300) / n) + self.numbers * np.log(n) + 2.0 * np.log(max(model_count, 1))
         )
 
-    def gain(self, base_errors: Errors) -> tuple[float, float]:
-        """(share of the squared held-out error of another model that this one takes away, its standard error)."""
-        change = (base_errors.held_out - self.held_out) / max(float(base_errors.held_out.sum()), 1e-300)
-        return float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change)))
+    def beside(self, base_errors: Errors) -> BlockComparison:
+        """How it predicts held-out blocks beside another model."""
+        return compare_blocks(base_errors.held_out, self.held_out)
 
 
 def errors(solution: Solution, memory: Memories, margins: Sequence[FloatArray], extra_numbers: int = 0) -> Errors:
