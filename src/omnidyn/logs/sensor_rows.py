@@ -55,11 +55,11 @@ def _held(t: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
         np.maximum(np.searchsorted(t, moment, side="right") - 1, 0)
         for moment in (at, 0.5 * (at + ends), np.nextafter(ends, 0.0))
     )
-    way = np.vstack([np.zeros(columns.shape[1]), np.cumsum(columns[:-1] * np.diff(t)[:, None], axis=0)])
+    integral = np.vstack([np.zeros(columns.shape[1]), np.cumsum(columns[:-1] * np.diff(t)[:, None], axis=0)])
     result = np.empty((len(at), columns.shape[1]))
     for k, column in enumerate(columns.T):
         changes = np.append(0, np.cumsum((column[1:] != column[:-1]) & np.isfinite(column[:-1])))
-        means = (np.interp(ends, t, way[:, k]) - np.interp(at, t, way[:, k])) / (ends - at)
+        means = (np.interp(ends, t, integral[:, k]) - np.interp(at, t, integral[:, k])) / (ends - at)
         plain = (changes[last] - changes[first] < 2) | ~np.isfinite(means)
         result[:, k] = np.where(plain, column[middle], means)
     return result if values.ndim == 2 else result[:, 0]

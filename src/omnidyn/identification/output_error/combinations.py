@@ -88,14 +88,17 @@ def slopes_of(problem: Problem, values: FloatArray, function: Callable[[Robot], 
 def std_of(slope: FloatArray, uncertainty: Trust) -> float:
     """Standard error of a combination (P,); infinite where it moves with what is lost."""
     lost = np.flatnonzero(uncertainty.blind_parameters)
-    if any(value < BLIND_EIGENVALUE and _share(slope, way, lost) > LOST_SHARE for value, way in uncertainty.directions):
+    if any(
+        value < BLIND_EIGENVALUE and _share(slope, direction, lost) > LOST_SHARE
+        for value, direction in uncertainty.directions
+    ):
         return np.inf
     finite = np.isfinite(np.diag(uncertainty.covariance))
     covariance = np.where(np.outer(finite, finite), uncertainty.covariance, uncertainty.plain_covariance)
     return float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
 
 
-def _share(slope: FloatArray, way: FloatArray, lost: Sequence[int] | NDArray[np.intp]) -> float:
+def _share(slope: FloatArray, direction: FloatArray, lost: Sequence[int] | NDArray[np.intp]) -> float:
     """How far a combination follows a direction, over how far it would if the slopes did not cancel."""
-    parts = slope[lost] * way[lost]
+    parts = slope[lost] * direction[lost]
     return float(abs(parts.sum()) / max(np.abs(parts).sum(), 1e-300))

@@ -57,8 +57,8 @@ class DrivenMotion:
     @cached_property
     def turned(self) -> FloatArray:
         """How far each wheel has turned since the first row [rad]. Shape (n, W)."""
-        way = 0.5 * (self.twist[1:] + self.twist[:-1]) * np.diff(self.t)[:, None]
-        angles = np.cumsum(way @ self.robot.wheels.wrench_matrix, axis=0) / self.robot.wheels.radii
+        travel = 0.5 * (self.twist[1:] + self.twist[:-1]) * np.diff(self.t)[:, None]
+        angles = np.cumsum(travel @ self.robot.wheels.wrench_matrix, axis=0) / self.robot.wheels.radii
         return np.append(np.zeros_like(angles[:1]), angles, axis=0)
 
     def twist_by(self, force: FloatArray) -> FloatArray:

@@ -302,7 +302,11 @@ def _observed(new_solution: Solution, uncertainty: Trust) -> FloatArray:
     def gradient(end: FloatArray) -> FloatArray:
         return Normal(solver, solver.state(Point(solver.outer(end), point.states))).gradient
 
-    ends = [solver.clipped(inner_values + side * uncertainty.quantile * way) for way in axes.T for side in (1.0, -1.0)]
+    ends = [
+        solver.clipped(inner_values + side * uncertainty.quantile * half_axis)
+        for half_axis in axes.T
+        for side in (1.0, -1.0)
+    ]
     gradients = np.array(side_by_side(gradient, ends))
     end_distances = np.linalg.norm(np.array(ends[0::2]) - np.array(ends[1::2]), axis=1) / np.linalg.norm(axes, axis=0)
     curvature = (gradients[1::2] - gradients[0::2]) @ axes / end_distances[:, None]

@@ -164,7 +164,7 @@ def _held(rate: FloatArray, dt: FloatArray) -> Iterator[FloatArray]:
 
 def _turned(twist: FloatArray, heading: FloatArray, dt: FloatArray) -> Iterator[FloatArray]:
     """The change of the position, for the same three and for the heading before, between and after."""
-    for way in _held(twist[:, :2], dt):
+    for travel in _held(twist[:, :2], dt):
         for share in (0.5, 0.0, 1.0):
             turn = body_to_world((1.0 - share) * heading[:-1] + share * heading[1:])[:, :2, :2]
-            yield np.einsum("kij,kj->ki", turn, way)
+            yield np.einsum("kij,kj->ki", turn, travel)

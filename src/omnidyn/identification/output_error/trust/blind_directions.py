@@ -52,11 +52,11 @@ def blind_ways(problem: FitProblem, values: FloatArray, information: FloatArray)
         return ()
     size, blind_list = sizes(problem, values), []
     scaled, lost, vectors = _lost(information, size)
-    for way in _sparse(vectors[:, lost].T):
-        way_information = float(way @ scaled @ way)
-        named_numbers = (np.abs(way) > SHARE) | (way**2 * np.diag(scaled) > VISIBLE_ERRORS**2)
+    for direction in _sparse(vectors[:, lost].T):
+        way_information = float(direction @ scaled @ direction)
+        named_numbers = (np.abs(direction) > SHARE) | (direction**2 * np.diag(scaled) > VISIBLE_ERRORS**2)
         reach = way_information**-0.5 if way_information > 0.0 else np.inf
-        blind_list.append(Way(reach, np.where(named_numbers, way, 0.0) * size, size))
+        blind_list.append(Way(reach, np.where(named_numbers, direction, 0.0) * size, size))
     return tuple(blind_list)
 
 

@@ -80,35 +80,46 @@ def blind_directions(
 ) -> tuple[Blind, ...]:
     """Each direction with what would show it. values (P,); moving_axes (3,): which axes did."""
     drives = _drives(problem, values) if ways else ()
-    return tuple(side_by_side(lambda way: _direction(problem, values, way, moving_axes, drives), ways))
+    return tuple(side_by_side(lambda direction: _direction(problem, values, direction, moving_axes, drives), ways))
 
 
 def _direction(
-    problem: Problem, values: FloatArray, way: Way, moving_axes: BoolArray, drives: Sequence[_Drive]
+    problem: Problem, values: FloatArray, direction: Way, moving_axes: BoolArray, drives: Sequence[_Drive]
 ) -> Blind:
-    indices = np.flatnonzero(way.step)
+    indices = np.flatnonzero(direction.step)
     names = [problem.names[j].partition("@")[0] for j in indices]
-    changes = {name: 0.01 * _relative(problem, values, way, int(j)) for name, j in zip(names, indices, strict=True)}
-    cures = tuple(dict.fromkeys(_cures(problem, values, way, names, moving_axes, drives)))[:MOST_CURES]
-    return Blind(changes, way.reach > EXACT, cures)
+    changes = {
+        name: 0.01 * _relative(problem, values, direction, int(j)) for name, j in zip(names, indices, strict=True)
+    }
+    cures = tuple(dict.fromkeys(_cures(problem, values, direction, names, moving_axes, drives)))[:MOST_CURES]
+    return Blind(changes, direction.reach > EXACT, cures)
 
 
-def _relative(problem: Problem, values: FloatArray, way: Way, j: int) -> float:
+def _relative(problem: Problem, values: FloatArray, direction: Way, j: int) -> float:
     """The change of a number along the direction, over the number, or over what it counts as where it is near 0."""
     p, value = problem.parameters[j], float(values[j])
-    return float(way.step[j]) if p.log else float(way.step[j]) / max(abs(value), 0.1 * float(way.size[j]))
+    return (
+        float(direction.step[j])
+        if p.log
+        else float(direction.step[j]) / max(abs(value), 0.1 * float(direction.size[j]))
+    )
 
 
 def _cures(
-    problem: Problem, values: FloatArray, way: Way, names: list[str], moving_axes: BoolArray, drives: Sequence[_Drive]
+    problem: Problem,
+    values: FloatArray,
+    direction: Way,
+    names: list[str],
+    moving_axes: BoolArray,
+    drives: Sequence[_Drive],
 ) -> Iterator[str]:
     yield from (measurable for measurable in MEASURABLE_KEYS if any(_is(name, measurable) for name in names))
     if not drives:
         return
     of_the_log, of_all_axes = drives
     try:
-        yield from _by_channels(problem, of_the_log.differs(problem, values, way))
-        seen_channels = of_all_axes.differs(problem, values, way)
+        yield from _by_channels(problem, of_the_log.differs(problem, values, direction))
+        seen_channels = of_all_axes.differs(problem, values, direction)
         if any(
             seen_channels[name] for name in dict.fromkeys(name for name, _ in problem.columns) if name in seen_channels
         ):
@@ -144,12 +155,12 @@ class _Drive:
     def of(cls, problem: Problem, values: FloatArray, volts: FloatArray, dt: FloatArray, start: FloatArray) -> _Drive:
         return cls(volts, dt, start, _channels(problem, values, volts, dt, start))
 
-    def differs(self, problem: Problem, values: FloatArray, way: Way) -> dict[str, bool]:
+    def differs(self, problem: Problem, values: FloatArray, direction: Way) -> dict[str, bool]:
         """Channel -> whether a change along the direction shows in it."""
         other_values = values.copy()
-        for j in np.flatnonzero(way.step):
+        for j in np.flatnonzero(direction.step):
             p = problem.parameters[j]
-            other_values[j] = p.outer(p.inner(float(values[j])) + TRIAL_CHANGE * float(way.step[j]))
+            other_values[j] = p.outer(p.inner(float(values[j])) + TRIAL_CHANGE * float(direction.step[j]))
         channels_after, differs_by_channel = _channels(problem, other_values, self.volts, self.dt, self.start), {}
         for name, channel_values in self.channels_before.items():
             size = np.sqrt((channel_values**2).mean(axis=0))

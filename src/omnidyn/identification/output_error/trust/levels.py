@@ -49,8 +49,8 @@ def trade(cost: Callable[[Place], float], limit: float, is_inside: Callable[[Pla
 
     likely_levels(of, FIRST, limit)
     start, walk = _Row(1.0, row), Walk([], [])
-    for way in (1.0, -1.0):
-        _outwards(cost, limit, is_inside, start, way, walk)
+    for side in (1.0, -1.0):
+        _outwards(cost, limit, is_inside, start, side, walk)
     return walk
 
 
@@ -77,13 +77,13 @@ def _outwards(
     limit: float,
     is_inside: Callable[[Place], bool],
     start: _Row,
-    way: float,
+    side: float,
     walk: Walk,
 ) -> None:
     rows, step, cost_limit = [start], LEAST_STEP, min(start.cost) + limit
     outer_places: list[Place] = []
     while step >= LEAST_STEP:
-        q = float(rows[-1].q * np.exp(way * step))
+        q = float(rows[-1].q * np.exp(side * step))
         s, reach = _next(rows, q, cost_limit)
         row = _row(cost, q, s, reach, ROW)
         cost_limit = min(cost_limit, min(row.cost) + limit)

@@ -125,8 +125,8 @@ def profile_interval(solver: Solver, solution: Solution, uncertainty: Trust, ind
     parameter = solver.problem.parameters[index]
     best = parameter.inner(float(solution.state.point.values[index]))
     low, high = (
-        _end(solver, solution, index, best, way * (std if std > 0.0 else abs(best) or 1.0), limit)
-        for way in (-1.0, 1.0)
+        _end(solver, solution, index, best, side * (std if std > 0.0 else abs(best) or 1.0), limit)
+        for side in (-1.0, 1.0)
     )
     return parameter.outer(low), parameter.outer(high)
 
@@ -148,7 +148,7 @@ def difference_interval(
         return 2.0 * (tied_solution.state.objective - solution.state.objective), tied_solution.state.point
 
     best, point = float(values[second] - values[first]), Point(np.delete(values, second), states)
-    low, high = (_crossing(rise, best, way * std, way * np.inf, point, limit) for way in (-1.0, 1.0))
+    low, high = (_crossing(rise, best, side * std, side * np.inf, point, limit) for side in (-1.0, 1.0))
     return low, high
 
 

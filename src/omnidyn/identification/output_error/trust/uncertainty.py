@@ -96,17 +96,17 @@ class Trust:
         """The same beside numbers that are only known so far: what a std of each moves the parameters by, (P, K)."""
         return replace(self, covariance=self.covariance + shifts @ shifts.T)
 
-    def rise(self, way: FloatArray) -> float:
+    def rise(self, direction: FloatArray) -> float:
         """2 (F - least F) at the ends of a 95 % interval of the sum of way (P,) times the parameters.
 
         3.84 where noise is white. Elsewhere the likelihood is too steep, and as much more of it as the variance is
         larger than its curvature tells: Kent, Biometrika 69 (1982); Royall, Tsou, J. R. Stat. Soc. B 65 (2003).
         """
-        slope_square = float(way @ self.plain_covariance @ way)
+        slope_square = float(direction @ self.plain_covariance @ direction)
         if self.kind == WHITE or slope_square <= 0.0:
             return RISE
         finite_covariance = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
-        return self.quantile**2 * float(way @ finite_covariance @ way) / slope_square
+        return self.quantile**2 * float(direction @ finite_covariance @ direction) / slope_square
 
 
 def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
@@ -277,10 +277,10 @@ def _seen(
         for value, vector in zip(values, vectors.T, strict=True):
             held_share = float(vector**2 @ (prior[seen_indices] / size**2))
             if value < WEAK_EIGENVALUE and not (held_share > 0.0 and held_share > 0.5 * value):
-                way = np.zeros(len(diagonal))
-                way[seen_indices] = vector / size / relative[seen_indices]
-                way /= np.abs(way).max()
-                directions.append((float(value), way))
+                direction = np.zeros(len(diagonal))
+                direction[seen_indices] = vector / size / relative[seen_indices]
+                direction /= np.abs(direction).max()
+                directions.append((float(value), direction))
                 if value < BLIND_EIGENVALUE:
                     lost.append(np.zeros(len(diagonal)))
                     lost[-1][seen_indices] = vector
