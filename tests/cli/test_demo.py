@@ -114,7 +114,7 @@ def test_a_damaged_marker_removes_nothing_outside(tmp_path, marker):
 
 
 def test_a_demo_that_was_killed_can_be_done_again(tmp_path, monkeypatch):
-    import omnidyn.cli.demo as module
+    import omnidyn.cli.demo_folder as module
 
     folder = tmp_path / "demo"
     real = module.write_atomic
