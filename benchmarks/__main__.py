@@ -20,6 +20,7 @@ NAMES = {
     "compare": "compare on simulated logs: rmse, false alarms of the test of white errors, which robot is better",
     "check": "12 faults in 200 simulated logs each, 1000 clean logs: what `omnidyn check` finds and says (10 minutes)",
     "steady": "steady-state identification: real logs beside their README; coverage on simulated ones (3 minutes)",
+    "floors": "changes of friction inside a run: how many are named, of one floor too, beside two halves (a minute)",
     "plant": "implicit engine: cost of a step, iterations of the solver, error against cost beside scipy and MuJoCo",
     "big_log": "a log of 1 GB in pieces, CSV and Parquet: processor time and memory (writes it to a temporary folder)",
     "large": "identify on three logs of 40 s at 200 Hz, four wheels, 12 channels: time, memory (ten minutes)",

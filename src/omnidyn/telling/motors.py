@@ -257,6 +257,7 @@ SENTENCES = {
     "line_meets_zero": Sentence(_line_meets_zero),
     "dead_band_bounded": Sentence(_dead_band_bounded),
     "dead_band_seen": Sentence(_dead_band_seen),
+    "dead_band_of_starts": Sentence("its line tells no dead band, its starts do"),
     "dead_band_hardly_known": Sentence(_dead_band_hardly_known),
     "dead_band_negative": Sentence(_dead_band_negative),
     "slope_may_be_zero": Sentence(_slope_may_be_zero),

@@ -144,7 +144,7 @@ def test_without_a_fall_there_is_no_stribeck_speed(seed):
     assert fit.ci95[KEYS[1]][0] <= low <= 2.2 <= high <= 2.7
     assert fit.value[HELD] >= fit.value[KEYS[1]]
     assert KEYS[3] in fit.unidentifiable  # how fast nothing falls
-    assert "not Stribeck speed" in fit.verdict
+    assert "not known: Stribeck speed" in fit.verdict
     assert "no_fall" in codes(fit.warnings)
 
 

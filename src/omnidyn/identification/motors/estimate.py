@@ -190,6 +190,8 @@ class MotorEstimate:
         return statements
 
     def _of_dead_band(self, has_start: bool) -> Statement:
+        if has_start and BAND in self.value and not (self.dead_band_seen or self.dead_band_needed):
+            return Statement("dead_band_of_starts", NOTE)
         if BAND in self.rejected:
             numbers = {"high": max(self.rejected[BAND][1], 0.0), "unit": self.unit, "better": None, "blocks": None}
             if comparison := self.comparisons.get(BAND):
