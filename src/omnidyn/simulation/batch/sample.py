@@ -23,7 +23,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import motor_wrench
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, COULOMB, DIRECTION, EMF, TORQUE, VISCOUS, Key, expand
-from omnidyn.model.known.told import holding
+from omnidyn.model.known.breakaway_levels import holding
 from omnidyn.model.known.uncertainty import MOST_DRAWS, Draws
 from omnidyn.model.mass import added_mass
 from omnidyn.model.robot import Robot
