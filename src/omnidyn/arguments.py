@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Iterable, Iterator
+from numbers import Integral, Real
 
 from omnidyn.errors import InputError
 
@@ -28,6 +29,16 @@ def is_frame(value: object) -> bool:
     """Whether a value is a data frame of pandas or polars, or an xarray Dataset; none of them is imported for this."""
     kind = type(value)
     return kind.__module__.partition(".")[0] in _FRAMES and kind.__name__ in ("DataFrame", "Dataset")
+
+
+def is_whole(value: object) -> bool:
+    """Whether a value is a whole number, of Python or of NumPy; True and False are none."""
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is one real number, of Python or of NumPy; True and False are none."""
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def check_order(call: str, *places: tuple[object, Kinds]) -> None:

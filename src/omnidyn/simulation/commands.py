@@ -178,11 +178,14 @@ def _steps(dt: ArrayLike, count: int) -> FloatArray:
 
 
 def as_floats(name: str, value: ArrayLike | None) -> FloatArray:
-    """A float64 array; raises InputError for what is not numbers."""
+    """A float64 array; raises InputError for what is not real numbers."""
     try:
-        return np.asarray(value, dtype=float)
+        given = np.asarray(value)
+        if given.dtype.kind in "bc":
+            raise TypeError
+        return np.asarray(given, dtype=float)
     except (TypeError, ValueError):
-        raise InputError("not numbers", got=value, expected="an array of numbers", where=name) from None
+        raise InputError("not numbers", got=value, expected="an array of real numbers", where=name) from None
 
 
 def _clipped(name: str, mask: BoolArray) -> tuple[Statement, ...]:

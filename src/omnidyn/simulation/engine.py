@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from omnidyn.arguments import is_number
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.actuation import reaching
@@ -372,7 +373,7 @@ def as_tolerance(tol: float | None) -> float:
     """The tolerance [m/s], 0 for None: a fixed step a row. Raises InputError outside 1e-10..1 m/s."""
     if tol is None:
         return 0.0
-    if not 1e-10 <= tol <= 1.0:
+    if not is_number(tol) or not 1e-10 <= tol <= 1.0:
         raise InputError(
             "tolerance out of range",
             got=tol,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from omnidyn.arguments import is_number, is_whole
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.model.drive import SPEED
@@ -115,7 +116,9 @@ class Batch:
         self.dt, self.command, self.pose, self._supply = _as_dt(dt), command, pose, supply
         _check_word("pose", pose, POSES)
         _check_word("command", command, (VOLTAGE, DUTY, WHEEL_SPEED))
-        _check_word("dtype", np.dtype(dtype).name, ("float64", "float32"))
+        _check_word("dtype", _dtype_name(dtype), ("float64", "float32"))
+        if supply is not None and not is_number(supply):
+            raise InputError("no supply", got=supply, expected="one number of volts, or None", where="supply")
         as_tolerance(tol)
         self._threads = Threads(threads)
         self._groups = self._group(robots, np.dtype(dtype), tol)
@@ -135,7 +138,9 @@ class Batch:
                 turning, drivers = np.full(parameters.count, center.body.rotating_frame), [(center, slice(None))]
                 group = BlockGroup(kind, parameters, drivers, turning, self.dt, self.pose, dtype)
                 return [(np.arange(parameters.count), group)]
-        fleet = list(robots)
+        fleet: Any = robots
+        if isinstance(robots, Iterable) and not isinstance(robots, str | Robot):
+            fleet = list(robots)  # what can be walked once, too
         self.wheels = wheels_of(fleet)
         kinds: dict[int, str] = {}
         for robot in fleet:
@@ -215,7 +220,7 @@ class Batch:
 
     def run(self, command: ArrayLike, *, every: int | None = None, statistics: bool = False) -> BatchRun:
         """Hold rows of commands, shape (rows, wheels) for all or (n, rows, wheels); see `simulate_batch`."""
-        if every is not None and (not isinstance(every, int) or every < 1):
+        if every is not None and (not is_whole(every) or every < 1):
             raise InputError(
                 "cannot keep every so many samples", got=every, expected="1 or more, or None", where="every"
             )
@@ -291,13 +296,21 @@ def _warnings(runs: list[GroupRun], command: str, rows: int) -> tuple[Statement,
 
 
 def _as_dt(dt: float) -> float:
-    if not isinstance(dt, int | float | np.floating | np.integer) or not MIN_DT <= dt <= MAX_DT:
+    if not is_number(dt) or not MIN_DT <= dt <= MAX_DT:
         raise InputError("step out of range", got=dt, expected=f"one number, {MIN_DT:g} to {MAX_DT:g} s", where="dt")
     return float(dt)
 
 
+def _dtype_name(dtype: Any) -> str:
+    """The name of a dtype, or what was given in its place."""
+    try:
+        return np.dtype(dtype).name
+    except TypeError:
+        return str(dtype)
+
+
 def _check_word(name: str, word: Any, words: tuple[Any, ...]) -> None:
-    if word not in words:
+    if not isinstance(word, str | type(None)) or word not in words:
         expected = ", ".join(str(choice) for choice in words)
         raise InputError(f"no such {name}", got=word, expected=f"one of {expected}", where=name)
 

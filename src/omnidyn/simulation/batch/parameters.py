@@ -6,7 +6,7 @@ loop along a row becomes vector instructions, and a block stays in the cache nea
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,7 +54,11 @@ class BatchParameters(NamedTuple):
 
 def wheels_of(robots: Sequence[Robot]) -> int:
     """The number of wheels of each of some robots. Raises InputError where they differ in it, or there is no robot."""
-    if isinstance(robots, str | Robot) or not all(isinstance(robot, Robot) for robot in robots):
+    if (
+        not isinstance(robots, Iterable)
+        or isinstance(robots, str)
+        or not all(isinstance(robot, Robot) for robot in robots)
+    ):
         raise InputError(
             "not robots",
             got=robots.name if isinstance(robots, Robot) else type(robots).__name__,

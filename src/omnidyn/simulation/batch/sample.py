@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.arguments import is_whole
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import motor_wrench
@@ -102,8 +103,10 @@ def sample(
     center = fit if isinstance(fit, Robot) else getattr(fit, "robot", None)
     if not isinstance(center, Robot):
         raise InputError("cannot draw robots from this", got=type(fit).__name__, expected="an estimate, or a robot")
-    if not isinstance(count, int) or not 1 <= count <= MOST_DRAWS:
+    if not is_whole(count) or not 1 <= count <= MOST_DRAWS:
         raise InputError("strange number of draws", got=count, expected=f"1 to {MOST_DRAWS}", where="count")
+    if not is_whole(seed) or seed < 0:
+        raise InputError("no seed", got=seed, expected="a whole number, 0 or more", where="seed")
     if ranges is None and factors is None:
         draws = Draws(center, count, seed)
         keys, values = [str(key) for key in draws.keys], draws.values

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from omnidyn.arguments import is_whole
 from omnidyn.compiled.parallel import MOST_THREADS
 from omnidyn.errors import InputError
 
@@ -15,7 +16,7 @@ class Threads:
     """So many threads; None: one for each processor. The pool starts with the first work that is worth two."""
 
     def __init__(self, count: int | None) -> None:
-        if count is not None and (not isinstance(count, int) or count < 1):
+        if count is not None and (not is_whole(count) or count < 1):
             raise InputError(
                 "cannot work with so many threads", got=count, expected="1 or more, or None", where="threads"
             )
