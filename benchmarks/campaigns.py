@@ -99,9 +99,8 @@ def _overhead(table: Table, folder: Path) -> None:
             sweep(spec | {"samples": count}, folder / name, task=index, **options)
             value = 1e3 * (time.perf_counter() - begun) / count
             goal, met = (f"below {GOAL_MS:g} ms", value < GOAL_MS) if count == MANY else ("", None)
-            table.add(
-                goal, met, what=f"overhead on {name}", work=f"{count} empty shards", value=value, unit="ms a shard"
-            )
+            work = f"{count} empty shards"
+            table.add(goal, met, what=f"overhead on {name}", work=work, value=value, unit="ms a shard")
 
 
 @contextlib.contextmanager
