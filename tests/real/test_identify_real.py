@@ -139,8 +139,10 @@ def study(runs):
 
 
 def test_one_call_tells_the_story_of_both_floors(study):
+    """Green: fitted to every second direction, levels of each wheel predict the others within 1.66 N, one level of all
+    within 1.84 N, none within 2.24 N; fitted to all directions, blocks of these say so too."""
     assert study.choice.of("gray") == "ellipse-plain"
-    assert study.choice.of("green") == "ellipse-plain+wheel"
+    assert study.choice.of("green") == "ellipse-plain+wheels"
     assert study.choice.score.loo < 2.5
     order = [score.name for score in study.choice.scores]
     for better, worse in (("ellipse", "disc"), ("disc", "wheel+roller"), ("wheel+roller", "wheel"), ("wheel", "box")):
