@@ -29,9 +29,8 @@ GRAVITY = 9.81
 NUMBERS = ("push", "emf", "inertia", "coulomb", "viscous", "yaw_coulomb", "yaw_viscous")
 BOUNDS = (0.05, 20.0)  # times the start
 DIFFERENCE = 0.03  # relative, of its derivatives: the best of 1e-4, 1e-2, 3e-2
-XML = """<mujoco><option timestep="{step}" gravity="0 0 -9.81"
- integrator="implicitfast" cone="elliptic" impratio="100"/>
-<worldbody><geom name="floor" type="plane" size="0 0 1" solref="0.004 1" friction="1 0 0"/>
+XML = """<mujoco><option timestep="{step}" gravity="0 0 -9.81" integrator="implicitfast" cone="elliptic"
+impratio="100"/><worldbody><geom name="floor" type="plane" size="0 0 1" solref="0.004 1" friction="1 0 0"/>
 <body name="robot" pos="0 0 0.05"><inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia} {inertia} {inertia}"/>
 <joint name="x" type="slide" axis="1 0 0" damping="1"/><joint name="y" type="slide" axis="0 1 0" damping="1"/>
 <joint name="z" type="slide" axis="0 0 1"/>
