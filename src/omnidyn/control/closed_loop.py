@@ -150,7 +150,7 @@ def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by
     if not wanted:
         raise InputError("no controller", got="an empty list", expected="one controller or more", where="controller")
     options = {"supply": supply, **told_of_loop(believed, around)}
-    controllers = told_apart([_controller(entry, believed, options) for entry in wanted])
+    controllers = told_apart([_controller(entry, believed, options) for entry in wanted], wanted)
     trackings = [tracked(plant or robot, follow, follower, around, progress) for follower in controllers]
     return Trackings(tuple(trackings)) if isinstance(controller, list | tuple) else trackings[0]
 

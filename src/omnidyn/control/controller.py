@@ -214,8 +214,12 @@ class Safe:
         self._missing = 0
         try:
             demand, limits = output(dt)
-            sent = np.clip(demand, -self.limit, self.limit)
-            fine = sent.shape == self.limit.shape and bool(np.isfinite(sent).all())
+            sent, largest = demand, self.limit
+            if sent.shape != largest.shape or not (abs(sent) <= largest).all():
+                sent = np.clip(demand, -largest, largest)
+                fine = sent.shape == largest.shape and bool(np.isfinite(sent).all())
+            else:
+                fine = True
         except Exception as raised:  # the loop of a robot must not end here, but where a user ends it
             error = told_by(raised)
             if isinstance(error, INTERRUPTS):

@@ -3,7 +3,7 @@
     int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[3], const float twist[3],
                              const omnidyn_motion path[3], float output[]);
 
-What it works out is traced from the controllers of Python (trace.py): there is one formula.
+What it works out is traced from the controllers of Python (compiled/trace.py): there is one formula.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.compiled.trace import Traced, inputs
 from omnidyn.control.controller import LARGEST_STATE, LATEST, MOST_BRIDGED, WHEEL_SPEED, Safe
 from omnidyn.control.controllers import controller_spec
 from omnidyn.control.feedforward import DT, Feedforward, check_dt
@@ -26,7 +27,7 @@ from omnidyn.control.paths.motion import Path, Reference
 from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import MOST_STEPS, SpeedController
 from omnidyn.export.code.mpc_code import mpc_code, mpc_input, mpc_memory, mpc_switches
-from omnidyn.export.code.trace import Traced, inputs, statements
+from omnidyn.export.code.trace import statements
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse, refuse_controller
 from omnidyn.export.spelling import c_comment, c_number, filled
@@ -194,7 +195,7 @@ int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[
 """
 
 
-# A controller of one robot in C: its formulas traced from Python (trace.py), and what joins them
+# A controller of one robot in C: its formulas traced from Python (compiled/trace.py), and what joins them
 #
 # What joins them holds no formula of the robot: numbers are checked, errors summed up, outputs kept within limits, as
 # `Guarded.step` and the controllers' `_output` do.
@@ -337,7 +338,6 @@ def _summed(controller: Pid | SpeedController, arguments: str) -> str:
 
 def _pid(controller: Pid) -> tuple[list[str], str]:
     """(functions, statements that put what is wanted into `output`)."""
-    names = {"off": (3,), "heading": (), "twist": (3,), "velocity": (3, 3)}
     head = "float off[3], velocity[3][3]"
     gather = (
         "for (k = 0; k < 9; k++) {\n    velocity[k / 3][k % 3] = path[k / 3].velocity[k % 3];\n}\n"
@@ -345,34 +345,12 @@ def _pid(controller: Pid) -> tuple[list[str], str]:
         f"off[2] = remainderf(off[2], {_c(2.0 * np.pi)});\n"
     )
     if controller.output == WHEEL_SPEED:
-        count = controller.robot.wheels.count
-        names = {
-            "off": (3,),
-            "heading": (),
-            "velocity": (3, 3),
-            "total": (3,),
-            "share": (),
-            "now": (3,),
-            "loop": (count,),
-        }
-
-        def commands(
-            off: Any, heading: Any, velocity: Any, total: Any, share: Any, now: Any, loop: Any
-        ) -> dict[str, Any]:
-            then = controller.wanted(off, heading, velocity, total) / share
-            sent, mean, volts = controller.commands.command(now, then, loop)
-            return {"output": sent, "mean": mean, "volts": volts, "then": then}
-
         call = filled(_COMMANDED, LONGEST=_c(MOST_STEPS * controller.dt)).strip()
         return [
-            _function("commands", names, commands, controller)
+            _function("commands", *controller.law(), controller)
         ], f"{head}, more[3], volts[OMNIDYN_WHEELS], then[3], share = 1.0f;\n{gather}{call}"
-
-    def efforts(off: Any, heading: Any, twist: Any, velocity: Any, total: Any) -> dict[str, Any]:
-        return _named(controller.effort(controller.aim(off, heading, twist, velocity), total))
-
-    functions = [_function("effort", {**names, "total": (3,)}, efforts, controller)]
     call = _summed(controller, "off, pose[2], twist, (const float(*)[3])velocity")
+    functions = [_function("effort", *controller.law(), controller)]
     return functions, f"{head}, more[3], current[OMNIDYN_WHEELS];\n{gather}{call}"
 
 

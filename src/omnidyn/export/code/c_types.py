@@ -91,10 +91,6 @@ Type = Scalar | Many | Array | Record | Struct | ColumnTypes
 Typed = tuple[str, Type]
 
 
-class TranslationError(Exception):
-    """A kernel uses what the translator does not know: a fault of ours, found by tests, never by a user."""
-
-
 def joined(first: Type | None, second: Type) -> Type:
     """The type of a name that holds the one and the other."""
     if first is None or first == second:
