@@ -197,7 +197,7 @@ def tracked(
     early = round(plant.drive.latency / dt) + around.delay
     draws = np.random.default_rng(around.seed).standard_normal((count + early, 6))
     lost = random.random(count + early) < kit.dropouts
-    readings = Readings(kit, live, -early * dt, around.noise * NOISE, controller.robot.wheels)
+    readings = Readings(kit, live, -early * dt, around.noise * NOISE, controller.robot.wheels, random)
     sent, volts, state = np.empty((count, n)), np.empty((count, n)), np.empty((count + 1, 6 + n))
     for k in range(-early, 0):  # it waits where the path begins; what is sent now acts when it does
         live.step(controller.step(k * dt, *readings.seen(draws[k], bool(lost[k])), path))

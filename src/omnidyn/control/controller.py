@@ -34,8 +34,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.control.filtered_twist import FilteredTwist, filtered_twist
-from omnidyn.control.late_pose import LatePose, late_pose
 from omnidyn.control.paths.adapter import as_path
+from omnidyn.control.pose_estimator import PoseEstimator, pose_estimator
 from omnidyn.control.pose_gate import JUMPED, REPEATED, SLIPPED, PoseGate
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.motor import DUTY, SPEED, no_load_speed
@@ -257,19 +257,19 @@ class Safe:
 class Guarded(Safe, ABC):
     """A controller whose steps are checked before and after it sees them; subclasses write `_output`."""
 
-    _late_pose: LatePose | None = None
+    _estimator: PoseEstimator | None = None
     _gate: PoseGate
 
     def _take(self, robot: Robot) -> None:
         super()._take(robot)
-        self._late_pose = late_pose(robot, self.dt, self._late_pose)
+        self._estimator = pose_estimator(robot, self.dt, self._estimator)
         self._gate = PoseGate(robot, self.dt, vars(self).get("_gate"))
 
     def reset(self) -> None:
         """Forget all steps."""
         super().reset()
-        if self._late_pose is not None:
-            self._late_pose.reset()
+        if self._estimator is not None:
+            self._estimator.reset()
         self._gate.reset()
 
     def step(self, t: float, pose: Any, twist: Any, path: Any, supply: float | None = None) -> FloatArray:
@@ -286,9 +286,9 @@ class Guarded(Safe, ABC):
             return self._guarded(t, word, "", None)
         status = PATH_ENDED if _ended(follow, t) else OK
         if math.isfinite(now := _number(t)):
-            if self._late_pose is not None:
-                place = self._late_pose.now(now, place, speed)
             state = np.concatenate([place, speed])
+            if self._estimator is not None:
+                self._estimator.estimate(now, state)
             status = DOUBTS.get(self._gate.judge(now, state), status)
             place, speed = state[:3], state[3:]
         return self._guarded(t, "", status, lambda dt: self._output(float(t), dt, place, speed, follow))

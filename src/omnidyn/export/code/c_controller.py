@@ -25,6 +25,20 @@ from omnidyn.control.feedforward import DT, Feedforward, check_dt
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.motion import Path, Reference
 from omnidyn.control.pid import Pid
+from omnidyn.control.pose_estimator import (
+    AGE,
+    ALL_OF_IT,
+    BY_DISTANCE,
+    BY_TIME,
+    BY_TURN,
+    OUTLIER_SQUARE,
+    PLACE_STD,
+    TURN_BY_DISTANCE,
+    TURN_BY_TIME,
+    TURN_STD,
+    WAIT_STD,
+    rows_of,
+)
 from omnidyn.control.speed_loop import MOST_STEPS, SpeedController
 from omnidyn.export.code.mpc_code import mpc_code, mpc_input, mpc_memory, mpc_switches
 from omnidyn.export.code.trace import statements
@@ -97,8 +111,8 @@ def _header(law: Any, about: str) -> str:
 
 
 def _is_late(law: Any) -> bool:
-    """Whether the poses of its robot are old when they arrive."""
-    return law.sensors.pose_age(law.dt) > 0.0
+    """Whether an estimator stands between the poses of its robot and itself."""
+    return law._estimator is not None
 
 
 def _is_commanded(law: Any) -> bool:
@@ -107,24 +121,38 @@ def _is_commanded(law: Any) -> bool:
 
 
 def _late_rows(law: Any) -> int:
-    """How many steps are kept, where they may be half as long as they should be; 0 where poses are new."""
-    return math.ceil(2.0 * law.sensors.pose_age(law.dt) / law.dt) + 2 if _is_late(law) else 0
+    """How many steps are kept; 0 where poses are taken as they are."""
+    return rows_of(float(law._estimator.numbers[AGE]), law.dt) if _is_late(law) else 0
 
 
 def _late_pose_code(law: Any) -> str:
-    """The function that brings a late pose up to now, none where poses are new."""
+    """The function that brings a pose up to now, none where poses are taken as they are."""
     if not _is_late(law):
         return "#define LATE_ROWS 0"
-    numbers = {"ROWS": _late_rows(law), "MEAN": int(law.sensors.averaged), "AGE": _c(law.sensors.pose_age(law.dt))}
-    defines = "\n".join(f"#define LATE_{name} {value}" for name, value in numbers.items())
-    text = files("omnidyn.export.code").joinpath("late_pose.c").read_text("utf-8")
+    numbers = law._estimator.numbers.tolist()
+    texts = {"ROWS": str(_late_rows(law)), "MEAN": str(int(law.sensors.averaged))}
+    texts |= {name: _c(numbers[entry]) for name, entry in _LATE_NUMBERS.items()}
+    texts |= {"OUTLIER": _c(OUTLIER_SQUARE), "FULL_TURN": _c(2.0 * math.pi), "ALL_OF_IT": _c(ALL_OF_IT)}
+    defines = "\n".join(f"#define LATE_{name} {text}" for name, text in texts.items())
+    text = files("omnidyn.export.code").joinpath("pose_estimator.c").read_text("utf-8")
     return f"#include <string.h>\n\n{defines}\n\n{text.strip()}"
 
 
+_LATE_NUMBERS = {
+    "AGE": AGE,
+    "NOISE": PLACE_STD,
+    "TURN_NOISE": TURN_STD,
+    "BY_DISTANCE": BY_DISTANCE,
+    "BY_TURN": BY_TURN,
+    "TURN_BY_DISTANCE": TURN_BY_DISTANCE,
+    "BY_TIME": BY_TIME,
+    "TURN_BY_TIME": TURN_BY_TIME,
+    "WAIT": WAIT_STD,
+}
 _LATE = """
-/* Places of the last steps, seen from where the robot is now, and the pose that arrived last. */
+/* Places of the last steps, seen from where the robot is now, the pose that arrived last, and what is believed of it. */
 typedef struct {
-    float age[@ROWS@], place[@ROWS@][3], seen[3], then[3], twist[3], waited;
+    float age[@ROWS@], place[@ROWS@][3], seen[3], then[3], anchor[3], variance[2], drift[2], twist[3], waited;
     int count, known;
 } omnidyn_late;
 """
