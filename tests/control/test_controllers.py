@@ -30,8 +30,8 @@ from omnidyn.control.feedforward import Feedforward
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import SpeedLoop
-from omnidyn.model.log_effects import Sensors
 from omnidyn.errors import InputError, Terminated
+from omnidyn.model.log_effects import Sensors
 from omnidyn.model.motor import Drive
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.live import LiveRobot

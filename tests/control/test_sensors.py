@@ -109,6 +109,19 @@ def test_a_robot_that_was_carried_away_is_believed_where_it_is():
     np.testing.assert_array_equal(believed(bridge, 1.0, [0.5, 0.1, 3.0], np.zeros(3)), [0.5, 0.1, 3.0])
 
 
+@pytest.mark.parametrize("make", [Pid, Mpc])
+@pytest.mark.parametrize("kind", ["encoder", "camera"])
+def test_a_fit_of_late_poses_drives_on_encoders_and_on_a_camera(make, kind):
+    """[log.latency] says how late poses of the log were; nobody says what feeds the loop: 18 mm and more, it was."""
+    plant, along, fit = Plant(NUMBERS["axebot"]), paths()["clover"], robot_of("axebot", NUMBERS["axebot"])
+    known = errors(plant, make(told(fit, kind)), along, kind)
+    age = 0.04 + 0.5 / 60.0  # of the camera, and the mean time that a frame waits for a step
+    late = Lateness(position=age, heading=age, wheel_angle=0.0)
+    fitted = errors(plant, make(fit.replace(log=LogEffects(latency=late))), along, kind)
+    for own, true, least in zip(fitted[:2], known, (0.05, 0.2), strict=False):
+        assert own < 1.2 * true + least
+
+
 @pytest.mark.parametrize("kind", ["pid", "mpc"])
 def test_many_robots_with_late_poses_are_one_each(kind):
     robot = AXEBOT.replace(sensors=Sensors(twist="mean", pose_delay=0.05, pose_rate=30.0, encoder_counts=2048))

@@ -163,7 +163,7 @@ def several(
     """Controllers for one robot, each by name or file; "pid_no_friction" and "mpc_no_observer" are names too.
 
     no_friction: none of them knows of dry friction, or has an observer; no_observer: none has an observer. Two of one
-    name are told apart by their files, else by a number. Raises InputError where an option given is none of any of them.
+    name are told apart by their files, else by a number. Raises InputError where no controller has an option given.
     """
     specs = [_spec(name, no_friction, no_observer) for name in names]
     keys = [*(key for key in options if key not in OF_THE_CALL), *(["observer"] if no_observer else [])]

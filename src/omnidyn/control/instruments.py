@@ -71,7 +71,7 @@ RANGES = {
 }
 _VALUE = re.compile(rf"(\d+(?:\.\d*)?(?:e[+-]?\d+)?)\s*({'|'.join(UNITS)})", re.ASCII | re.IGNORECASE)
 _SPELLED = {unit.lower(): unit for unit in UNITS}
-OF_SENSORS = ("twist_filter", "encoder_counts", "gyro_noise", "gyro_bias") + tuple(PARTS["pose"].values())
+OF_SENSORS = ("twist_filter", "encoder_counts", "gyro_noise", "gyro_bias", *PARTS["pose"].values())
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,9 @@ class Readings:
         told = np.array([sensors.pose_noise or 0.0] * 2 + [sensors.heading_noise or 0.0, 0.0, 0.0, 0.0])
         self._kit, self._live, self._noise = kit, live, np.hypot(noise, told)
         self._random = random or np.random.default_rng(0)
-        self._bias = (sensors.gyro_bias or 0.0) * float(self._random.standard_normal()) if sensors.has_gyroscope else 0.0
+        self._bias = (
+            (sensors.gyro_bias or 0.0) * float(self._random.standard_normal()) if sensors.has_gyroscope else 0.0
+        )
         self._wheels, self._believed = live.robot.wheels, believed or live.robot.wheels
         counts = sensors.encoder_counts
         self._turn = None if counts is None else 2.0 * math.pi / counts  # [rad] of a count

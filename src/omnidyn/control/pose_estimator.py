@@ -4,11 +4,14 @@
     a  += g (pose seen - pose believed of the time it was taken),   g = p/(p + s^2),   p -> (1 - g) p
 
 `counted` adds the measured twists up. s: std of a pose, its noise and what the robot moves in the time by which its age
-may differ from the mean: it waits for a step. p, the variance of what is believed, grows from
-one new pose to the next by (2 u)^(4/3) s^(2/3), where u is by how far the count may have drifted meanwhile: a share of
-the distance, for wheels are of a slightly other size, and of the time, for a gyroscope has a bias. With that, the error
-of a steady drift, u/g, and that of the noise, s sqrt(g/2), are least together. A pose that comes again as it was is no
-new one. One farther off than all that explains is of a robot that was moved: it is believed at once.
+may differ from the mean: it waits for a step. p, the variance of what is believed, grows from one new pose to the next
+by (2 u)^(4/3) s^(2/3), where u is by how far the count may have drifted meanwhile: a share of the distance, for wheels
+are of a slightly other size, and of the time, for a gyroscope has a bias. With that, the error of a steady drift, u/g,
+and that of the noise, s sqrt(g/2), are least together. A pose that comes again as it was is no new one. One farther off
+than all that explains is of a robot that was moved: it is believed at once.
+
+Where the file of the robot says nothing of its sensors, and the logs of its fit had late poses, poses that the same
+wheels have counted are known by moving with them from the first step on: these are taken as they are.
 """
 
 from __future__ import annotations
@@ -26,14 +29,39 @@ NOISE = (1e-3, 2e-3)  # [m], [rad] std of a late pose, where nobody says
 DISTANCE_DRIFT, TURN_DRIFT = 3e-3, 3e-3  # share of the distance, and of the angle turned
 RIM_DRIFT = 3e-4  # [rad] times the distance over the radius of the robot: wheels that differ turn it
 TIME_DRIFT, TURN_TIME_DRIFT = 1e-4, 2e-4  # [m/s], [rad/s]
+LONGEST = 1.5  # steps after the one before, of which a mean of the twist is all
 OUTLIER_SQUARE = 36.0  # of an innovation, in variances
 MOST_ROWS, TURN, ALL_OF_IT = 2000, 2.0 * math.pi, 0.9999
-SEEN, ANCHOR, THEN, TWIST, CLOCK, FIRST = 0, 1, 2, 3, 4, 5  # rows; FIRST: the oldest place of the last steps
+SEEN, ANCHOR, THEN, TWIST, CLOCK, LAST, FIRST = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+)  # rows; LAST: the pose of the step before; FIRST: the oldest place of the last steps
 KNOWN, FIRM = (SEEN, 3), 2.0  # whether a pose was seen, and one of a time since which all was counted
 PLACE_VARIANCE, TURN_VARIANCE = (ANCHOR, 3), (THEN, 3)
 COUNT = (TWIST, 3)  # of the places kept
 TIME, DRIFT, TURN_DRIFTED, BEGUN = (CLOCK, 0), (CLOCK, 1), (CLOCK, 2), (CLOCK, 3)
-AGE, AVERAGED, PLACE_STD, TURN_STD, BY_DISTANCE, BY_TURN, TURN_BY_DISTANCE, BY_TIME, TURN_BY_TIME, WAIT_STD = range(10)
+KIND = (LAST, 3)  # of the poses, where that is not told
+COUNTED, OLD = 1.0, 2.0  # new, late; 0: nobody knows
+ALIKE, TINY = 0.05, 1e-6  # share of the way by which two counts of it may differ; [m], [rad]
+(
+    AGE,
+    AVERAGED,
+    PLACE_STD,
+    TURN_STD,
+    BY_DISTANCE,
+    BY_TURN,
+    TURN_BY_DISTANCE,
+    BY_TIME,
+    TURN_BY_TIME,
+    WAIT_STD,
+    UNSURE,
+    STEP,
+) = range(12)
 
 
 @part
@@ -134,6 +162,30 @@ def correct(memory, numbers, state):
 
 
 @part
+def tell_kind(memory, numbers, passed, pose, state):
+    """Find out whether poses are counted by the same wheels, and so new: from rest they then move at once.
+
+    pose: as it was measured, before the step is counted.
+    """
+    share = 1.0 if numbers[AVERAGED] != 0.0 else 0.5
+    x = passed * (share * state[3] + (1.0 - share) * memory[TWIST, 0])
+    y = passed * (share * state[4] + (1.0 - share) * memory[TWIST, 1])
+    turn = passed * (share * state[5] + (1.0 - share) * memory[TWIST, 2])
+    middle = memory[LAST, 2] + 0.5 * turn
+    cos, sin = math.cos(middle), math.sin(middle)
+    off = math.hypot(
+        pose[0] - memory[LAST, 0] - cos * x + sin * y,
+        pose[1] - memory[LAST, 1] - sin * x - cos * y,
+    )
+    turn_off = pose[2] - memory[LAST, 2] - turn
+    turn_off -= TURN * round(turn_off / TURN)
+    way = math.hypot(x, y)
+    if way + abs(turn) > TINY:
+        alike = (off <= ALIKE * way + TINY) & (abs(turn_off) <= ALIKE * abs(turn) + TINY)
+        memory[KIND] = COUNTED if alike & (memory[KIND] != OLD) else OLD
+
+
+@part
 def bring_up(memory, numbers, t, state):
     """Change a measured state (6,) into one with the pose at time t [s]; NaN where it holds no number."""
     for i in range(6):
@@ -148,13 +200,19 @@ def bring_up(memory, numbers, t, state):
                 memory[k, i] = 0.0
         passed = 0.0
     memory[TIME], memory[BEGUN] = t, 1.0
+    pose = state[0], state[1], state[2]
+    if (numbers[UNSURE] > 0.0) & (passed > 0.0) & (passed < LONGEST * numbers[STEP]):
+        tell_kind(memory, numbers, passed, pose, state)
+    for i in range(3):
+        memory[LAST, i] = pose[i]
     count_on(memory, numbers, passed, state)
     is_new = memory[KNOWN] == 0.0
     for i in range(3):
         is_new = is_new or state[i] != memory[SEEN, i]
     if is_new:
         correct(memory, numbers, state)
-    state[0], state[1], state[2] = from_anchor(memory)
+    if memory[KIND] != COUNTED:
+        state[0], state[1], state[2] = from_anchor(memory)
 
 
 @kernel
@@ -194,7 +252,7 @@ def pose_noise_of(sensors: Sensors) -> tuple[float, float]:
 
 
 def estimator_numbers(robot: Robot, dt: float, noise: tuple[float, float] | None = None) -> FloatArray:
-    """What an estimator knows, in the order of AGE, AVERAGED, ... Shape (10,)."""
+    """What an estimator knows, in the order of AGE, AVERAGED, ... Shape (12,)."""
     sensors = robot.sensor_model
     place, heading = noise or pose_noise_of(sensors)
     by_gyroscope = sensors.has_gyroscope
@@ -211,7 +269,9 @@ def estimator_numbers(robot: Robot, dt: float, noise: tuple[float, float] | None
             0.0 if by_gyroscope else RIM_DRIFT / radius,
             TIME_DRIFT,
             turn_by_time,
-            sensors.pose_wait(dt) / math.sqrt(12.0),
+            (dt if robot.sensors is None else sensors.pose_wait(dt)) / math.sqrt(12.0),  # a log does not say the rate
+            float(robot.sensors is None),
+            dt,
         ]
     )
 

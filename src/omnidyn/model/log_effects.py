@@ -59,8 +59,8 @@ class Sensors(Value):
     twist_filter [s]: time constant of a low pass of first order behind that, 0 without one.
     encoder_counts: in a turn of a wheel, None: nothing is known of them. gyro_noise, gyro_bias [rad/s]: std of a sample
     of a gyroscope that gives omega, and of what it shows at rest; None: omega comes from the wheels.
-    pose_delay [s]: age of a pose when it arrives. pose_rate [Hz]: of new poses, None: one in every step. pose_noise [m],
-    heading_noise [rad]: std of a pose along x and along y, and of its heading; None: nobody says.
+    pose_delay [s]: age of a pose when it arrives. pose_rate [Hz]: of new poses, None: one in every step. pose_noise
+    [m], heading_noise [rad]: std of a pose along x and along y, and of its heading; None: nobody says.
     """
 
     twist: Annotated[Literal["instantaneous", "mean"], Field(description="mean: differences of encoders")] = (

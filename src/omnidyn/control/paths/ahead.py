@@ -17,7 +17,8 @@ Row = tuple[float, ...]
 class Ahead:
     """Of steps dt [s] apart whose outputs act `late` [s] later.
 
-    before: whose samples are kept where both are the same. A path that is another object in every step is asked for that step alone.
+    before: whose samples are kept where both are the same. A path that is another object in every step is asked for
+    that step alone.
     """
 
     def __init__(self, dt: float, late: float, before: Ahead | None = None) -> None:

@@ -27,15 +27,18 @@ from omnidyn.control.paths.motion import Path, Reference
 from omnidyn.control.pid import Pid
 from omnidyn.control.pose_estimator import (
     AGE,
+    ALIKE,
     ALL_OF_IT,
     BY_DISTANCE,
     BY_TIME,
     BY_TURN,
+    LONGEST,
     OUTLIER_SQUARE,
     PLACE_STD,
     TURN_BY_DISTANCE,
     TURN_BY_TIME,
     TURN_STD,
+    UNSURE,
     WAIT_STD,
     rows_of,
 )
@@ -133,11 +136,14 @@ def _late_pose_code(law: Any) -> str:
     texts = {"ROWS": str(_late_rows(law)), "MEAN": str(int(law.sensors.averaged))}
     texts |= {name: _c(numbers[entry]) for name, entry in _LATE_NUMBERS.items()}
     texts |= {"OUTLIER": _c(OUTLIER_SQUARE), "FULL_TURN": _c(2.0 * math.pi), "ALL_OF_IT": _c(ALL_OF_IT)}
+    texts |= {"UNSURE": str(int(numbers[UNSURE])), "LONGEST": _c(LONGEST * law.dt)}
+    texts |= {"ALIKE": _c(ALIKE), "TINY": _c(TINY_IN_C)}
     defines = "\n".join(f"#define LATE_{name} {text}" for name, text in texts.items())
     text = files("omnidyn.export.code").joinpath("pose_estimator.c").read_text("utf-8")
     return f"#include <string.h>\n\n{defines}\n\n{text.strip()}"
 
 
+TINY_IN_C = 2e-6  # [m], [rad]: what float32 makes of poses of some metres
 _LATE_NUMBERS = {
     "AGE": AGE,
     "NOISE": PLACE_STD,
@@ -150,10 +156,11 @@ _LATE_NUMBERS = {
     "WAIT": WAIT_STD,
 }
 _LATE = """
-/* Places of the last steps, seen from where the robot is now, the pose that arrived last, and what is believed of it. */
+/* Places of the last steps, seen from where the robot is now, the pose that arrived last, what is believed of it. */
 typedef struct {
     float age[@ROWS@], place[@ROWS@][3], seen[3], then[3], anchor[3], variance[2], drift[2], twist[3], waited;
-    int count, known;
+    float last[3];
+    int count, known, kind;
 } omnidyn_late;
 """
 

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.compiled.trace import TranslationError
+
 # Functions of <math.h> that Python calls by the same name.
 MATH = frozenset(
     ("exp", "expm1", "log1p", "sqrt", "sin", "cos", "sinh", "cosh", "atan2", "copysign", "hypot", "ceil", "pow")

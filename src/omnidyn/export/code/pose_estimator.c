@@ -99,16 +99,52 @@ static void correct(omnidyn_late *late, const float pose[3], const float twist[3
     late->known = 1 + (late->age[0] >= LATE_ALL_OF_IT * LATE_AGE); /* whether all since then was counted */
 }
 
+#if LATE_UNSURE
+/* Find out whether poses are counted by the same wheels, and so new: from rest they then move at once. */
+static void tell_kind(omnidyn_late *late, float passed, const float pose[3], const float twist[3])
+{
+    float mean[3], cosine, sine, off[3], way;
+    int i, alike;
+    for (i = 0; i < 3; i++) {
+        mean[i] = passed * (LATE_MEAN ? twist[i] : 0.5f * (twist[i] + late->twist[i]));
+        off[i] = pose[i] - late->last[i];
+    }
+    cosine = cosf(late->last[2] + 0.5f * mean[2]);
+    sine = sinf(late->last[2] + 0.5f * mean[2]);
+    off[0] -= cosine * mean[0] - sine * mean[1];
+    off[1] -= sine * mean[0] + cosine * mean[1];
+    off[2] = remainderf(off[2] - mean[2], LATE_FULL_TURN);
+    way = sqrtf(mean[0] * mean[0] + mean[1] * mean[1]);
+    if (way + fabsf(mean[2]) > LATE_TINY) {
+        alike = sqrtf(off[0] * off[0] + off[1] * off[1]) <= LATE_ALIKE * way + LATE_TINY &&
+                fabsf(off[2]) <= LATE_ALIKE * fabsf(mean[2]) + LATE_TINY;
+        late->kind = alike && late->kind != 2 ? 1 : 2; /* 1: counted, 2: late */
+    }
+}
+#endif
+
 /* Writes the pose as of now into `now`. */
 static void pose_now(omnidyn_late *late, float elapsed, const float pose[3], const float twist[3], float now[3])
 {
-    const float *then = late->then;
+    const float *then = late->then, passed = late->count ? late->waited + elapsed : 0.0f;
     float cosine, sine;
-    count_on(late, late->count ? late->waited + elapsed : 0.0f, twist);
+#if LATE_UNSURE
+    if (passed > 0.0f && passed < LATE_LONGEST) {
+        tell_kind(late, passed, pose, twist);
+    }
+    memcpy(late->last, pose, sizeof(late->last));
+#endif
+    count_on(late, passed, twist);
     late->waited = 0.0f;
     if (!late->known || pose[0] != late->seen[0] || pose[1] != late->seen[1] || pose[2] != late->seen[2]) {
         correct(late, pose, twist);
     }
+#if LATE_UNSURE
+    if (late->kind == 1) {
+        memcpy(now, pose, sizeof(late->last));
+        return;
+    }
+#endif
     now[2] = late->anchor[2] - then[2];
     cosine = cosf(now[2]);
     sine = sinf(now[2]);
