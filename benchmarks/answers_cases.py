@@ -363,8 +363,8 @@ check(load_log("full.csv"))
 read_commands("c.csv", 3)
 read_commands("ds.csv", 3, duration=1.2)
 read_commands("back.csv", 3)
-read_voltages("u.csv", 3)
-read_voltages("d.csv", 3)
+read_commands("u.csv", 3)
+read_commands("d.csv", 3).voltage
 read_steady_table("examples/table1.csv")
 read_steady_table("stds.csv")
 identify(read_steady_table("examples/table1.csv"), load_robot("axebot"), SteadyState(rest="line")).estimate

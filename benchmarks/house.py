@@ -15,7 +15,11 @@ from pathlib import Path
 
 import omnidyn
 from benchmarks.table import Table
+from tests.house.test_engines import named_outside
 from tests.house.test_import_direction import Import, circles, imports
+from tests.house.test_maps import missing
+from tests.house.test_selection import KEPT as RULES
+from tests.house.test_words import FORBIDDEN, forbidden, glued, names_of_classes_twice
 
 PACKAGE = Path(omnidyn.__file__).parent
 RUN = 6  # lines that count as a block that stands twice
@@ -49,7 +53,9 @@ def figures(package: Path) -> dict[str, str]:
     twice = blocks(texts)
     every = imports(package)
     found = circles(every)
-    trees = [ast.parse("\n".join(lines)) for lines in texts.values()]
+    by_path = {path: ast.parse("\n".join(lines)) for path, lines in texts.items()}
+    trees = [*by_path.values()]
+    fits = [tree for path, tree in by_path.items() if path.relative_to(package).parts[0] == "identification"]
     return {
         "statements of the syntax tree": f"{sum(map(statement_count, trees))}",
         "files": f"{len(texts)}",
@@ -60,11 +66,21 @@ def figures(package: Path) -> dict[str, str]:
         "blank lines": f"{sum(not line.strip() for lines in texts.values() for line in lines)}",
         f"files of fewer than {SHORT} lines, no __init__": f"{len(short_files(texts))}",
         "modules imported from exactly one": f"{len(with_one_importer(every))}",
-        "names of classes that stand twice": f"{names_twice(trees)}",
+        "names of classes that stand twice": f"{len(names_of_classes_twice(trees))}",
+        "second modules glued into a file": f"{sum(len(glued(path)) for path in texts)}",
+        f"names that are {', '.join(FORBIDDEN)}": f"{sum(map(forbidden, trees))}",
+        "names of files that stand five times": f"{names_of_files(texts)}",
+        "modules missing from maps": f"{sum(len(missing(folder)) for folder in {path.parent for path in texts})}",
         "folders": f"{len(folders)}",
         "most files in a folder": f"{max(folders.values())}",
         "longest file": f"{max(len(lines) for lines in texts.values())}",
         f"functions of more than {TOO_MANY} parameters": f"{sum(count > TOO_MANY for count, _ in lists)}",
+        "statements of identification": f"{sum(statement_count(tree) for tree in fits)}",
+        "classes of identification": f"{sum(map(class_count, fits))}",
+        "constants of identification": f"{sum(map(constant_count, fits))}",
+        "files of identification with a rule of selection": f"{len(RULES)}",
+        "files naming an engine of another": f"{len(named_outside(package))}",
+        "files naming wheel_angle": f"{sum('wheel_angle' in ' '.join(lines) for lines in texts.values())}",
         f"pairs of blocks of {RUN} lines that stand twice": f"{twice}",
         "circles between files or folders": f"{len(found)}",
         **{f"lines of {name}": f"{count}" for name, count in floors.most_common(10)},
@@ -118,12 +134,31 @@ def with_one_importer(every: list[Import]) -> list[str]:
     return sorted(name for name, found in importers.items() if len(found) == 1 and not name.endswith("__init__"))
 
 
-def names_twice(trees: list[ast.Module]) -> int:
-    """Names that more than one class has, in different files."""
-    found = Counter(
-        name for tree in trees for name in {node.name for node in tree.body if isinstance(node, ast.ClassDef)}
-    )
-    return sum(count > 1 for count in found.values())
+def class_count(tree: ast.AST) -> int:
+    """Classes of a file, inner ones included."""
+    return sum(isinstance(node, ast.ClassDef) for node in ast.walk(tree))
+
+
+def constant_count(tree: ast.Module) -> int:
+    """Numbers that stand behind a name in capitals at the top of a file; a tuple of them counts one by one."""
+    found = [node for node in tree.body if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None]
+    named = [node for node in found if all(name.isupper() for name in _targets(node))]
+    return sum(_is_number(number) for node in named for number in ast.walk(node))
+
+
+def _targets(node: ast.Assign | ast.AnnAssign) -> list[str]:
+    targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+    return [name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+
+
+def _is_number(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool)
+
+
+def names_of_files(texts: dict[Path, list[str]]) -> int:
+    """Names that five or more files have, the map of a folder and those of the tabs of the studio aside."""
+    found = Counter(path.name for path in texts if path.stem != "__init__" and "studio" not in path.parts)
+    return sum(count >= 5 for count in found.values())
 
 
 def parameters(package: Path) -> list[tuple[int, str]]:

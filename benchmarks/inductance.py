@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 
 from benchmarks.table import Table, Times, machine, one_core
+from omnidyn.simulation.exact.exact_march import ExactMarch
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
-from omnidyn.simulation.exact.march import ExactMarch
 from tests.support.robots import TABLE_3, robot_of, table_3_voltages, with_breakaway
 
 DT, ROUNDS, REPEATS = 1e-3, 10, 5

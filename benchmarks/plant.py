@@ -21,10 +21,10 @@ from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, Wh
 from omnidyn.model.layout import new_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
-from omnidyn.simulation.implicit.march import run_implicit
+from omnidyn.simulation.implicit.implicit_march import run_implicit
 from omnidyn.simulation.simulate import simulate
-from omnidyn.simulation.slip.march import SlipOutcome, rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant
+from omnidyn.simulation.slip.slip_march import SlipOutcome, rolling, run_slipping
 from omnidyn.simulation.speed_loop import no_loop
 from tests.reference.make import FILE
 from tests.support.robots import TABLE_3, robot_of, table_3_voltages

@@ -74,7 +74,6 @@ def test_right_ones_pass_and_what_an_iterator_holds_is_not_asked():
         omnidyn.dead_zone,
         omnidyn.axis_patterns,
         omnidyn.state_space,
-        omnidyn.plausible,
         lambda name: omnidyn.dead_zone_map(name, [0.0]),
         lambda name: omnidyn.breakaway_voltage(name, VOLTS),
         lambda name: omnidyn.moving_axes(name, VOLTS),

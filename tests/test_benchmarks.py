@@ -28,6 +28,7 @@ QUICK = (
     "stagger",
     "identify_loop",
     "ten_robots",
+    "floors",
     "studies",
     "environments",
 )

@@ -59,12 +59,10 @@ _HOME = {
     "moving_axes": "omnidyn.model.deadzone",
     "path": "omnidyn.control.paths.path",
     "path_demand": "omnidyn.control.demand",
-    "plausible": "omnidyn.model.known.uncertainty",
     "preset_names": "omnidyn.model.robot_file",
     "read_commands": "omnidyn.logs.command_file",
     "read_log": "omnidyn.logs.read_log",
     "read_steady_table": "omnidyn.logs.steady_table",
-    "read_voltages": "omnidyn.logs.command_file",
     "sample": "omnidyn.simulation.batch.sample",
     "save_robot": "omnidyn.model.robot_file",
     "simulate": "omnidyn.simulation.simulate",
@@ -101,14 +99,13 @@ if TYPE_CHECKING:
     from omnidyn.identification.identification import Identification
     from omnidyn.identification.identify import identify
     from omnidyn.identification.methods import MotorFit, MotorLine, OutputError, SteadyState
-    from omnidyn.logs.command_file import read_commands, read_voltages
+    from omnidyn.logs.command_file import read_commands
     from omnidyn.logs.read_log import load_log, read_log
     from omnidyn.logs.run_file import write_run
     from omnidyn.logs.steady_table import read_steady_table
     from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moving_axes
     from omnidyn.model.dynamics import acceleration, state_space
     from omnidyn.model.known.dead_zone import dead_zone
-    from omnidyn.model.known.uncertainty import plausible
     from omnidyn.model.robot import Robot
     from omnidyn.model.robot_file import load_robot, preset_names, save_robot
     from omnidyn.model.vary import vary_robot

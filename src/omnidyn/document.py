@@ -10,11 +10,14 @@ import re
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 WIDTH = 100  # columns of text that knows no terminal
 GAP = "  "  # between two columns of a table
 TINY_CHANCE = 0.001
+VERDICT_WORDS = 25  # of a line
+MOST_DIGITS = 6  # of two numbers that are nearly alike
 MOST_WHOLE = 1e6  # from which on an exponent reads better
 
 Paint = Callable[[str, str], str]  # a word and its tone -> the word in the colour of that tone
@@ -122,6 +125,11 @@ class Document:
         """The verdict with a capital and a full stop; text stays as it is."""
         return self.verdict if isinstance(self.verdict, str) else sentence(str(self.verdict))
 
+    def verdict_lines(self, width: int, paint: Paint = _bare) -> list[str]:
+        """The verdict in a line, then what it rests on as points."""
+        first, points = in_clauses(self.verdict_text)
+        return [*Words(first).lines(width, paint), *Points(points).lines(width, paint)]
+
     def legend(self) -> list[str]:
         """A line for each word of the trade that occurs in the parts."""
         texts = (part if isinstance(part, str) else "\n".join(part.lines(WIDTH, _bare)) for part in self.parts)
@@ -129,7 +137,7 @@ class Document:
 
     def to_text(self, width: int = WIDTH, paint: Paint = _bare) -> str:
         """The document for people, without a line break at its end. paint: how signs get their colours."""
-        lines: list[str] = [*Words(self.verdict_text).lines(width, paint), ""] if self.verdict else []
+        lines: list[str] = [*self.verdict_lines(width, paint), ""] if self.verdict else []
         for part in self.parts:
             lines += [part] if isinstance(part, str) else part.lines(width, paint)
         if legend := self.legend():
@@ -137,6 +145,35 @@ class Document:
             lines += [line for words in legend for line in Words(words, rest="  ").lines(width, paint)]
         text = "\n".join(lines)
         return text.encode("ascii", "backslashreplace").decode() if self.ascii else text
+
+
+def in_clauses(words: str, most: int = VERDICT_WORDS) -> tuple[str, list[str]]:
+    """(the first clauses with at most so many words, a sentence; the other clauses): how a long verdict is laid out.
+
+    A clause ends at a semicolon or with its sentence, outside of brackets; a first one that is too long at a colon or
+    before "but" too.
+    """
+    first, *others = _cut(words, r"(?<=;) |(?<=\.) (?=[A-Z])")
+    if len(first.split()) > most:
+        parts = _cut(first, r"(?<=:) |(?<=,) (?=but )")
+        count = _fitting(parts, most)
+        first, others = " ".join(parts[:count]), [*([" ".join(parts[count:])] if parts[count:] else []), *others]
+    else:
+        count = _fitting([first, *others], most)
+        first, others = " ".join([first, *others[: count - 1]]), others[count - 1 :]
+    return f"{first.rstrip(';:,.')}." if others else first, [clause.rstrip(";.") for clause in others]
+
+
+def _cut(words: str, ends: str) -> list[str]:
+    """Words, cut at each blank that matches and does not stand in brackets."""
+    blanks = [match.start() for match in re.finditer(ends, words)]
+    cuts = [k for k in blanks if all(words.count(a, 0, k) == words.count(b, 0, k) for a, b in ("()", "[]"))]
+    return [words[a + 1 : b] for a, b in pairwise([-1, *cuts, len(words)])]
+
+
+def _fitting(parts: Sequence[str], most: int) -> int:
+    """How many of the first parts have at most so many words together, at least one."""
+    return max([1, *(k for k in range(1, len(parts) + 1) if len(" ".join(parts[:k]).split()) <= most)])
 
 
 def sentence(words: str) -> str:
@@ -174,6 +211,15 @@ def short(value: float, form: str = ".2g") -> str:
     """A number of a sentence: 120, where Python writes 1.2e+02."""
     text = f"{value:{form}}"
     return f"{float(text):{form[: form.index('.')]}.0f}" if "e+" in text and abs(value) < MOST_WHOLE else text
+
+
+def both(first: float, second: float, digits: int = 3) -> tuple[str, str] | None:
+    """Two numbers of a sentence with as many digits as show that they differ; None where MOST_DIGITS do not."""
+    for count in range(digits, MOST_DIGITS + 1):
+        words = (short(first, f".{count}g"), short(second, f".{count}g"))
+        if words[0] != words[1]:
+            return words
+    return None
 
 
 def cell(value: float | None, form: str) -> str:

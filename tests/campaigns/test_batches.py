@@ -6,7 +6,7 @@ import pytest
 from omnidyn.campaigns import batches
 from omnidyn.campaigns.batches import batch_columns, batched
 from omnidyn.campaigns.spec import parse_spec
-from omnidyn.campaigns.tasks import SIMULATE_METRICS, TRACK_METRICS, Problem
+from omnidyn.campaigns.tasks import SIMULATE_METRICS, TRACK_METRICS, LoadedSpec
 from omnidyn.errors import InputError
 from omnidyn.model.robot_file import load_robot, robot_to_toml, save_robot
 
@@ -22,7 +22,7 @@ SPEC = {"schema": 1, "robot": "axebot", "samples": 64, "vary": VARY, "simulate":
 
 def problem(tmp_path, **changes):
     """A problem whose spec was checked."""
-    made = Problem(parse_spec(SPEC | changes), tmp_path)
+    made = LoadedSpec(parse_spec(SPEC | changes), tmp_path)
     made.check()
     return made
 

@@ -10,7 +10,7 @@ import pytest
 from omnidyn.campaigns.results import load_campaign, variance_share, wilson
 from omnidyn.campaigns.spec import Spec
 from omnidyn.campaigns.sweep import sweep
-from omnidyn.campaigns.tasks import Problem
+from omnidyn.campaigns.tasks import LoadedSpec
 from omnidyn.errors import InputError
 from omnidyn.report.figures.campaign import draw_campaign
 from tests.support.campaign_tasks import product
@@ -30,7 +30,7 @@ def test_shares_of_ishigami_lie_in_their_intervals(sampling, width):
     hits, widths = 0, []
     for seed in range(40):
         spec = Spec(robot="axebot", samples=1024, sampling=sampling, seed=seed, vary=vary)
-        x = np.stack([*Problem(spec, Path()).columns(0, 1024).values()], axis=1)
+        x = np.stack([*LoadedSpec(spec, Path()).columns(0, 1024).values()], axis=1)
         for column, truth in zip(x.T, ISHIGAMI.values(), strict=True):
             share, low, high = variance_share(column, ishigami(x), balanced=sampling == "sobol")
             hits += low <= truth <= high

@@ -9,7 +9,7 @@ from scipy.stats import kstest, norm, qmc
 
 from omnidyn.campaigns.design import numbers, points, sample_count
 from omnidyn.campaigns.spec import Variable, load_spec, parse_spec, spec_tables
-from omnidyn.campaigns.tasks import Problem
+from omnidyn.campaigns.tasks import LoadedSpec
 from omnidyn.control.closed_loop import track
 from omnidyn.errors import InputError
 from omnidyn.model.keys import Key
@@ -22,7 +22,7 @@ TRACK = {"track": {"path": "circle", "duration_s": 0.4}}
 
 def problem(tmp_path, **changes):
     """A problem whose spec was checked."""
-    made = Problem(parse_spec(BASE | TRACK | changes), tmp_path)
+    made = LoadedSpec(parse_spec(BASE | TRACK | changes), tmp_path)
     made.check()
     return made
 

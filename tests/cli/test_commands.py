@@ -209,19 +209,19 @@ def test_simulate_refuses_a_tolerance_that_is_none(call, here):
 
 
 def test_simulate_writes_the_run_that_python_gives(call, here):
-    from omnidyn import read_voltages, simulate
+    from omnidyn import read_commands, simulate
 
     code, out, err = call("simulate", "axebot", "u.csv", "-o", "run.csv")
     assert code == 0
     assert "4 samples, 3 s" in out
     assert "wrote run.csv" in err
-    held = read_voltages(here / "u.csv", 3)
+    held = read_commands(here / "u.csv", 3)
     wanted = simulate(load_robot("axebot"), held.voltage, held.dt)
     assert read_run(here / "run.csv").pose.tobytes() == wanted.pose.tobytes()
 
 
 def test_simulate_with_a_band_writes_its_ends_beside_the_run(call, here):
-    from omnidyn import confidence_band, read_voltages, save_robot
+    from omnidyn import confidence_band, read_commands, save_robot
     from omnidyn.model.robot import Prior
 
     known = load_robot("axebot").replace(priors={"friction.axes.coulomb[0]": Prior(std=0.1, origin="guess")})
@@ -231,7 +231,7 @@ def test_simulate_with_a_band_writes_its_ends_beside_the_run(call, here):
     assert "[..]: 95 %, 100 robots drawn from the std and correlations of 1 numbers of the file" in out
     assert "rests on guesses of the robot file: friction" in out
     assert "wrote run.csv, run-low.csv, run-high.csv" in err
-    held = read_voltages(here / "u.csv", 3)
+    held = read_commands(here / "u.csv", 3)
     wanted = confidence_band(known, held.voltage, held.dt)
     for name, end in (("low", wanted.low), ("high", wanted.high)):
         assert read_run(here / f"run-{name}.csv").twist.tobytes() == end.twist.tobytes()

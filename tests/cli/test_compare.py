@@ -114,7 +114,7 @@ def test_a_model_that_follows_nothing_ends_with_4_and_is_shown(call):
     omnidyn.write_run(wrong, "mirrored.csv")
     code, out, err = call("mirrored.csv", "--robot", "axebot")
     assert code == 4
-    assert out.startswith("The model does not follow: ")
+    assert out.startswith("The model does not follow.")
     assert "axebot against mirrored.csv: 1 free run" in out
     assert err.splitlines()[-1].startswith("omnidyn: The model does not follow: ")
     code, out, _ = call("mirrored.csv", "--robot", "axebot", "--robot", "wrong.toml", "--json")

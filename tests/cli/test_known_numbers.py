@@ -60,7 +60,7 @@ def test_an_interval_of_a_recording_that_holds_0(capsys):
     told = json.loads(capsys.readouterr().out)
     check(told)
     assert told["verdict"].startswith(
-        "3 of 6 numbers are known, the widest (viscous friction turning) within 66 %; not "
+        "3 of 6 numbers are known, the widest (viscous friction turning) within 66 %; not known: "
     )
 
 

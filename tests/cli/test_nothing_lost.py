@@ -82,7 +82,7 @@ def test_a_page_that_cannot_be_drawn_costs_no_fit(call, driven, monkeypatch):
     code, out, err = call("identify", "log.csv", "--robot", "r.toml", "-o", "fit.toml", "--report", "fit.html")
     assert code == 0
     assert "omnidyn: not made: the page: bug: RuntimeError: a font is missing" in err
-    assert "Not made: the page (bug: RuntimeError: a font is missing)." in " ".join(out.split())
+    assert "Not made: the page (bug: RuntimeError: a font is missing)" in " ".join(out.split())
     assert "Coulomb" in out or "coulomb" in out
     assert (driven / "fit.toml").is_file()
     assert not (driven / "fit.html").exists()

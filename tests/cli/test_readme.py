@@ -72,9 +72,9 @@ def test_every_example_runs(tmp_path, example):
 
 
 def test_the_tables_of_the_examples_are_read():
-    from omnidyn import read_steady_table, read_voltages
+    from omnidyn import read_commands, read_steady_table
     from omnidyn.paper.friction import table_1_points
 
-    assert read_voltages(ROOT / "examples" / "voltages.csv", 3).voltage.shape == (4, 3)
+    assert read_commands(ROOT / "examples" / "voltages.csv", 3).voltage.shape == (4, 3)
     table, paper = read_steady_table(ROOT / "examples" / "table1.csv"), table_1_points()
     assert (table.speed.tolist(), table.force.tolist()) == (paper.speed.tolist(), paper.force.tolist())

@@ -36,7 +36,7 @@ import json, sys
 import numpy as np
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.dynamics import discretise, state_space
-from omnidyn.simulation.exact import march as exact
+from omnidyn.simulation.exact import exact_march as exact
 from omnidyn.simulation.exact.step import exact_step, pieces, turned_within
 from omnidyn.simulation.simulate import simulate
 robot, dt = load_robot("axebot"), 0.05
@@ -92,7 +92,7 @@ def before(copy):
 
 
 def test_an_edited_formula_is_compiled_anew(copy, before):
-    """exact/step.py is called by the kernel of exact/march.py, whose own file stays untouched."""
+    """exact/step.py is called by the kernel of exact/exact_march.py, whose own file stays untouched."""
     folder = {"NUMBA_CACHE_DIR": str(copy / "cache")}
     assert agrees_with_python(before)
     assert before["hits"] == 0
@@ -201,7 +201,7 @@ def decorated(decorator):
 
 def test_every_kernel_is_stamped_and_nothing_else_is_cached():
     kernels = decorated("kernel") | decorated("branching_kernel")
-    assert {"omnidyn.simulation.exact.march._run", "omnidyn.simulation.implicit.march._march"} <= kernels
+    assert {"omnidyn.simulation.exact.exact_march._run", "omnidyn.simulation.implicit.implicit_march._march"} <= kernels
     everything = dispatchers()
     assert kernels <= set(everything)
     for name, function in everything.items():

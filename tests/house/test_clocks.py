@@ -29,7 +29,7 @@ ALLOWED = {
     "identification/output_error/linear/sensitivity.py": (1, "not asked of clocks of their own"),
     "identification/output_error/problem/decimated.py": (3, "all rows, of which several are taken together"),
     "identification/structure/windows.py": (1, "the rows between which a command holds"),
-    "identification/output_error/linear/motion.py": (4, "steps of the simulation, which stops at every row"),
+    "identification/output_error/linear/driven_motion.py": (4, "steps of the simulation, which stops at every row"),
 }
 
 

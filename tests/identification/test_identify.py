@@ -127,7 +127,7 @@ def test_a_diagnosis_that_takes_far_longer_than_the_fit_offers_quick(monkeypatch
             clock[0] += spent
             return "something"
 
-    asked = module._Asked(None, None, (), False, said.append, print, Attempts(), fit_time)
+    asked = module._Request(None, None, (), False, said.append, print, Attempts(), fit_time)
     module._diagnosed({"all": Fit()}, asked)
     urgent = [report.phase for report in said if report.urgent]
     assert urgent == ["the diagnosis took 70 s, 7 times the fit; `quick` leaves it out"] * is_said

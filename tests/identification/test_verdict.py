@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from omnidyn.attempts import Attempts
-from omnidyn.document import sentence
+from omnidyn.document import in_clauses, sentence
 from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.identification.estimate import Correlation, Estimate
 from omnidyn.identification.identification import After, Identification
@@ -84,7 +84,7 @@ def test_a_half_good_fit():
     scores = GOOD | {"heading": Score(1.2, -20.0)}
     assert said(fit_verdict(fit, beside(scores))) == (
         "On the fitted logs the model follows wheel speeds within 3 %, but heading not at all (rms error 1.2 rad); "
-        "4 of 6 numbers are known, the widest (viscous friction forward) within 2 %; not "
+        "4 of 6 numbers are known, the widest (viscous friction forward) within 2 %; not known: "
         "viscous friction sideways and viscous friction turning."
     )
 
@@ -113,14 +113,15 @@ def test_a_number_whose_interval_holds_0_is_not_known():
     fit = estimate([0.02, 0.18, 0.02])
     wide = replace(fit, ci95=fit.ci95 | {BOX[1]: (2.0 - 12.7 * 0.18, 2.0 + 12.7 * 0.18)})
     assert wide.verdict == (
-        "2 of 3 numbers are known, the widest (viscous friction forward) within 2 %; not viscous friction sideways."
+        "2 of 3 numbers are known, the widest (viscous friction forward) within 2 %; not known: viscous friction "
+        "sideways."
     )
     far = replace(fit, ci95=fit.ci95 | {BOX[1]: (0.2, 20.0)})  # of a number with a logarithm
     assert not far.is_known(BOX[1])
     assert far.half_width(BOX[1]) == pytest.approx(4.95)
     bound = replace(fit, value=fit.value | {BOX[1]: 0.0}, ci95=fit.ci95 | {BOX[1]: (0.0, 0.3)}, at_bound=(BOX[1],))
     assert not bound.is_known(BOX[1])
-    assert bound.verdict.endswith("within 2 %; not viscous friction sideways.")
+    assert bound.verdict.endswith("within 2 %; not known: viscous friction sideways.")
 
 
 def test_groups_faults_and_interrupts_are_said():
@@ -141,7 +142,7 @@ def test_the_sentence_stands_first():
     run = noisy_draw(simulate(AXEBOT, excitation(10.0), 0.01), 1)
     found = identify(run, AXEBOT)
     text = found.document().to_text(400)
-    assert text.splitlines()[0] == found.verdict
+    assert text.splitlines()[0] == in_clauses(found.verdict)[0]
     assert found.verdict.startswith("On the fitted logs the model follows speed over the ground within ")
     assert "numbers are known" in found.verdict
     assert "Coulomb friction turning" in text
@@ -211,6 +212,7 @@ def motor(number, band=0.5, seen=True, slope=(0.1, 0.2)) -> Any:
         name="all motors" if number is None else f"motor {number + 1}",
         unit="V",
         dead_band_seen=seen,
+        dead_band_needed=False,
         offset_seen=False,
         answers=slope[0] > 0.0,
         value={"dead_band": band},

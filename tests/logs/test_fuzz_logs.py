@@ -9,7 +9,7 @@ from omnidyn.errors import OmnidynError
 from omnidyn.logs.columns.guess import guess_columns
 from omnidyn.logs.columns.mapping import load_map, map_to_toml, parse_column
 from omnidyn.logs.read_log import LogOptions, log_from_table, map_columns
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 
 ROBOT = load_robot("axebot")
 PARTS = [
@@ -33,7 +33,7 @@ def tables(draw):
         values = draw(cells)
         columns[name] = tuple(values) if isinstance(values[0], str) else np.array(values)
         given_units[name] = draw(units)
-    return Table(tuple(columns), columns, np.arange(2, 8), given_units, "fuzz.csv", "0" * 64)
+    return FileTable(tuple(columns), columns, np.arange(2, 8), given_units, "fuzz.csv", "0" * 64)
 
 
 options = st.builds(

@@ -7,7 +7,7 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.model.robot_file import PRESETS, load_robot, parse_robot
-from omnidyn.simulation.exact.march import why_not_exact
+from omnidyn.simulation.exact.exact_march import why_not_exact
 from omnidyn.simulation.simulate import simulate
 from tests.support.robots import table_3_voltages
 

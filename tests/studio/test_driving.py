@@ -10,7 +10,7 @@ import pytest
 import omnidyn
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.surroundings import Floor, Surface, Variations
-from omnidyn.studio.drive.job import Drive
+from omnidyn.studio.drive.job import DrivenRobot
 from omnidyn.studio.worker import CancelledError, JobError, Worker
 
 
@@ -24,7 +24,7 @@ def drive(robot, folder, *commands, steps=40):
         else:
             others[kind] = value
 
-    drive = Drive(robot, folder, tell, queue.Queue())
+    drive = DrivenRobot(robot, folder, tell, queue.Queue())
     drive._introduce()
     for command in commands:
         drive._take(command)

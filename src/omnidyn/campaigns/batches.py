@@ -21,8 +21,8 @@ from omnidyn.campaigns.tasks import (
     SETTLED,
     SIMULATE_METRICS,
     TRACK_METRICS,
-    Loop,
-    Problem,
+    ClosedLoop,
+    LoadedSpec,
     commands_of,
     settled_from,
     with_number,
@@ -38,7 +38,7 @@ from omnidyn.model.motor import settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.batch.batch import Batch, simulate_batch
-from omnidyn.simulation.batch.choice import BOX, DIRECTION, EXACT, GENERAL, VOLTAGE, engine_kind
+from omnidyn.simulation.batch.engine_kind import BOX, DIRECTION, EXACT, GENERAL, VOLTAGE, engine_kind
 from omnidyn.simulation.batch.sample import MASS, RADIUS, Sample
 from omnidyn.simulation.engine import TOLERANCE
 
@@ -51,7 +51,7 @@ STEP = 1e-3  # [s] the longest fixed step
 Fleet = Sample | list[Robot]
 
 
-def batched(problem: Problem) -> bool:
+def batched(problem: LoadedSpec) -> bool:
     """Whether the samples can be moved together."""
     spec, keys = problem.spec, [key for keys in problem.keys.values() for key in keys]
     robot = problem.robot
@@ -69,28 +69,28 @@ def batched(problem: Problem) -> bool:
     varied = keys if problem.draws is None else [*keys, *problem.draws.keys]
     if robot.wheels.traction_mu is not None or any(key.table == "drive" for key in varied):
         return False
-    loop = Loop.of(problem, first, spec.track)
+    loop = ClosedLoop.of(problem, first, spec.track)
     plain = loop.around.sensors == Instruments() and not loop.around.delay
     return plain and isinstance(loop.controller(), Pid)
 
 
-def _scales(problem: Problem) -> bool:
+def _scales(problem: LoadedSpec) -> bool:
     """Whether what varies are numbers that many robots at once may differ in."""
     keys = [key for keys in problem.keys.values() for key in keys]
     return not problem.spec.robot_draws and all(str(key) in BODY or key.part == FRICTION for key in keys)
 
 
-def _loops(problem: Problem) -> int:
+def _loops(problem: LoadedSpec) -> int:
     """Loops of a block."""
     return FEW if engine_kind(problem.robot, VOLTAGE, None) == GENERAL else LOOPS
 
 
-def block_rows(problem: Problem) -> int:
+def block_rows(problem: LoadedSpec) -> int:
     """Samples that are moved together whether they are asked for or not: a shard holds whole blocks of them."""
     return _loops(problem) if problem.spec.track is not None and batched(problem) else 1
 
 
-def batch_columns(problem: Problem, start: int, stop: int) -> dict[str, FloatArray]:
+def batch_columns(problem: LoadedSpec, start: int, stop: int) -> dict[str, FloatArray]:
     """What is measured of the samples start to stop: columns of metrics."""
     if problem.spec.track is not None:
         names = problem.spec.metrics or TRACK_METRICS
@@ -109,7 +109,7 @@ def batch_columns(problem: Problem, start: int, stop: int) -> dict[str, FloatArr
     return {name: np.concatenate([part[name] for part in parts]) for name in names}
 
 
-def _block(problem: Problem, first: int, size: int, start: int, stop: int) -> dict[str, FloatArray]:
+def _block(problem: LoadedSpec, first: int, size: int, start: int, stop: int) -> dict[str, FloatArray]:
     """The metrics of those loops of a block that lie within start to stop; all of the block are driven."""
     last = min(first + size, sample_count(problem.spec))
     measured = _tracked(problem, first, last)
@@ -117,7 +117,7 @@ def _block(problem: Problem, first: int, size: int, start: int, stop: int) -> di
     return {name: column[rows] for name, column in measured.items()}
 
 
-def _fleet(problem: Problem, start: int, stop: int) -> Fleet:
+def _fleet(problem: LoadedSpec, start: int, stop: int) -> Fleet:
     """The robots start to stop: numbers in arrays, where that is enough for blocks."""
     kind = engine_kind(problem.robot, VOLTAGE, None)
     if kind in (EXACT, BOX, DIRECTION) and problem.keys and _scales(problem):
@@ -136,10 +136,10 @@ def _moving(fleet: Fleet, dt: float, pose: FloatArray) -> tuple[Batch, int]:
     return Batch(fleet, dt / holds, start_pose=pose, threads=1, tol=tol), holds
 
 
-def _tracked(problem: Problem, start: int, stop: int) -> dict[str, FloatArray]:
+def _tracked(problem: LoadedSpec, start: int, stop: int) -> dict[str, FloatArray]:
     """`Loop.measure` of the samples start to stop."""
     assert problem.spec.track is not None
-    loop = Loop.of(problem, next(problem.samples(start, start + 1)), problem.spec.track)
+    loop = ClosedLoop.of(problem, next(problem.samples(start, start + 1)), problem.spec.track)
     around, route, fleet, n = loop.around, loop.route, _fleet(problem, start, stop), stop - start
     count, controller = around.steps(route), loop.controller()
     assert isinstance(controller, Pid)
@@ -171,7 +171,7 @@ def _state(batch: Batch) -> FloatArray:
 
 
 def _tracking(
-    problem: Problem, loop: Loop, fleet: Fleet, t: FloatArray, states: FloatArray, sent: FloatArray
+    problem: LoadedSpec, loop: ClosedLoop, fleet: Fleet, t: FloatArray, states: FloatArray, sent: FloatArray
 ) -> dict[str, FloatArray]:
     """The metrics of loops. t (samples,); states (samples, n, 6): poses, twists; sent (steps, n, wheels) [V]."""
     error = states[:, :, :3] - loop.route.at(t).pose[:, None]
@@ -196,7 +196,7 @@ def _tracking(
     return dict(zip(TRACK_METRICS, measured, strict=True))
 
 
-def _power(problem: Problem, fleet: Fleet, sent: FloatArray, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _power(problem: LoadedSpec, fleet: Fleet, sent: FloatArray, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(volts within the limits of each robot, (steps, n, wheels); electrical power [W], (steps, n))."""
     if isinstance(fleet, Sample):
         current = settled_current(problem.robot.motor, sent, _wheel_speeds(problem, fleet, twist))
@@ -209,7 +209,7 @@ def _power(problem: Problem, fleet: Fleet, sent: FloatArray, twist: FloatArray) 
     return volts, power
 
 
-def _wheel_speeds(problem: Problem, sample: Sample, twist: FloatArray) -> FloatArray:
+def _wheel_speeds(problem: LoadedSpec, sample: Sample, twist: FloatArray) -> FloatArray:
     """Wheel speeds at twists (rows, n, 3) of robots whose wheels differ. Shape (rows, n, wheels)."""
     scale = np.ones(len(sample))
     if RADIUS in sample.keys:
@@ -217,7 +217,7 @@ def _wheel_speeds(problem: Problem, sample: Sample, twist: FloatArray) -> FloatA
     return wheel_speed(problem.robot.wheels, twist) * scale[:, None]
 
 
-def _sample(problem: Problem, start: int, stop: int) -> Sample:
+def _sample(problem: LoadedSpec, start: int, stop: int) -> Sample:
     """The robots start to stop. Raises InputError where one of them cannot be."""
     values: dict[str, Any] = {}
     for name, column in problem.columns(start, stop).items():
@@ -239,7 +239,7 @@ def _sample(problem: Problem, start: int, stop: int) -> Sample:
     return Sample(problem.robot, list(values), np.stack(list(values.values()), axis=1), robot_of)
 
 
-def _measured(problem: Problem, sample: Sample, rows: FloatArray, dt: float, whole: bool) -> dict[str, FloatArray]:
+def _measured(problem: LoadedSpec, sample: Sample, rows: FloatArray, dt: float, whole: bool) -> dict[str, FloatArray]:
     """What is measured of robots under rows of volts. whole: also what needs all of their way."""
     robot, count = problem.robot, len(sample)
     run = simulate_batch(sample, rows, dt, every=1 if whole else None, threads=1)

@@ -34,7 +34,7 @@ Call = Callable[..., None]
 Calls = Iterable[tuple[int, tuple[Any, ...]]]
 
 
-class Pool(Protocol):
+class ShardPool(Protocol):
     """Where shards run."""
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
@@ -47,7 +47,7 @@ class Pool(Protocol):
 
 
 @contextmanager
-def opened(executor: Executor | None, scheduler: str, workers: int | None) -> Iterator[Pool]:
+def opened(executor: Executor | None, scheduler: str, workers: int | None) -> Iterator[ShardPool]:
     """The pool that was asked for; ours is closed in the end, and its processes with it."""
     if executor is not None:
         yield Given(executor)
@@ -99,7 +99,7 @@ class Given:
             return None
 
     def run(self, function: Call, calls: Calls) -> Iterator[tuple[int, str]]:
-        """See Pool."""
+        """See ShardPool."""
         futures = {self.executor.submit(function, *arguments): shard for shard, arguments in calls}
         try:
             while futures:
@@ -171,7 +171,7 @@ class Processes:
         return None
 
     def run(self, function: Call, calls: Calls) -> Iterator[tuple[int, str]]:
-        """See Pool. Two shards a process are in flight, so that none waits and few are suspects."""
+        """See ShardPool. Two shards a process are in flight, so that none waits and few are suspects."""
         queue, futures = iter(calls), dict[Future[None], tuple[int, tuple[Any, ...]]]()
         while True:
             suspects = [*futures.values()]

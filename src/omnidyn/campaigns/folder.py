@@ -98,7 +98,7 @@ def _text(value: Any) -> str:
     return "none" if value is None else json.dumps(value, ensure_ascii=False)[:60]
 
 
-class Record(NamedTuple):
+class ShardRecord(NamedTuple):
     """What a shard was when it was written.
 
     sha256: of its file. samples: from, to. manifest_sha256: of the manifest, which has the hashes of the inputs.
@@ -115,7 +115,7 @@ class Record(NamedTuple):
     def fault(self, path: Path) -> tuple[str, str, str] | None:
         """(what, got, expected) where the record in a file is not this one, which is that of the shard as it is."""
         try:
-            written = Record(**json.loads(path.read_bytes()))
+            written = ShardRecord(**json.loads(path.read_bytes()))
             first, last = map(int, written.samples)
         except (ValueError, TypeError):
             return "the record of this shard is damaged", path.name, "as a sweep wrote it"
@@ -238,7 +238,7 @@ class Folder:
             path, record = self.shard_path(shard), self.shard_path(shard, RECORD)
             if path.exists() and record.exists():
                 done.append(shard)
-                if fault := Record(file_sha256(path), manifest.rows(shard), manifest.sha256).fault(record):
+                if fault := ShardRecord(file_sha256(path), manifest.rows(shard), manifest.sha256).fault(record):
                     faults[path] = fault
         if faults:
             path, (what, got, expected) = next(iter(faults.items()))
@@ -254,7 +254,7 @@ class Folder:
         sink = pyarrow.BufferOutputStream()
         parquet.write_table(pyarrow.table(dict(columns)), sink, write_page_checksum=True)
         content, manifest = sink.getvalue().to_pybytes(), self.manifest
-        record = Record(sha256(content), manifest.rows(shard), manifest.sha256)
+        record = ShardRecord(sha256(content), manifest.rows(shard), manifest.sha256)
         self.shard_path(shard, RECORD).unlink(missing_ok=True)  # a shard that was there is not done until the end
         try:
             write_atomic(self.shard_path(shard), content, force=True)

@@ -21,7 +21,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.campaigns.fits import ENDS, VERDICT
 from omnidyn.campaigns.folder import CHECKED, SAMPLE, Folder, Status
 from omnidyn.campaigns.spec import GRID, SOBOL
-from omnidyn.campaigns.tasks import Problem
+from omnidyn.campaigns.tasks import LoadedSpec
 from omnidyn.document import Document, Part, Points, Table, plain
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.logs.readers.parquet import import_pyarrow
@@ -139,7 +139,7 @@ class Campaign(Displayable):
         It grows from what the file says, or from the middle of a range that does not hold that, to all sides alike.
         """
         beyond = ~(self.column(self.metric(metric)) <= limit)
-        sides = {name: ends for name, ends in Problem(self.folder.spec, self.folder.path).ends.items() if ends}
+        sides = {name: ends for name, ends in LoadedSpec(self.folder.spec, self.folder.path).ends.items() if ends}
         reach = np.zeros(len(beyond))
         for name, (low, centre, high) in sides.items():
             x = self.column(name)

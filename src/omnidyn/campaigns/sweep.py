@@ -17,12 +17,12 @@ import numpy as np
 
 from omnidyn.campaigns.batches import batch_columns, batched, block_rows
 from omnidyn.campaigns.design import sample_count
-from omnidyn.campaigns.executors import Pool, opened
+from omnidyn.campaigns.executors import ShardPool, opened
 from omnidyn.campaigns.fits import hashes_of, with_logs
 from omnidyn.campaigns.folder import SAMPLE, Folder, Manifest, as_columns, as_table
 from omnidyn.campaigns.results import Campaign
 from omnidyn.campaigns.spec import INPUTS, Spec, load_spec, parse_spec, spec_tables
-from omnidyn.campaigns.tasks import Function, Problem, Sample
+from omnidyn.campaigns.tasks import CampaignSample, Function, LoadedSpec
 from omnidyn.compiled.parallel import small_matrices
 from omnidyn.compiled.stamp import stamp
 from omnidyn.errors import InputError
@@ -75,7 +75,7 @@ def sweep(
     return Campaign(home)
 
 
-def _begun(home: Folder, spec: Any, function: Function | None, pool: Pool, progress: Progress) -> Manifest:
+def _begun(home: Folder, spec: Any, function: Function | None, pool: ShardPool, progress: Progress) -> Manifest:
     """The manifest of the campaign, its folder made where it is not there."""
     if spec is None:
         old = home.manifest
@@ -83,7 +83,7 @@ def _begun(home: Folder, spec: Any, function: Function | None, pool: Pool, progr
         return home.begin(old._replace(**_made_by(function, old.task), inputs=inputs), {})
     loaded, base = _read(spec)
     absolute = _renamed(loaded, lambda text: str((base / text).resolve()))
-    problem = Problem(with_logs(absolute, base), home.path, function)
+    problem = LoadedSpec(with_logs(absolute, base), home.path, function)
     problem.check()
     copies = _copies(absolute)
     local = _renamed(absolute, lambda text: copies[text][0])
@@ -156,7 +156,7 @@ def _made_by(function: Function | None, task: str) -> dict[str, str]:
     try:
         if "<" in name or "?" in name:
             raise OSError
-        digest = stamp(Problem.measure if function is None else function)
+        digest = stamp(LoadedSpec.measure if function is None else function)
     except (OSError, AttributeError):
         raise InputError(
             "other processes cannot find this task",
@@ -173,7 +173,7 @@ def _version() -> str:
     return sys.modules["omnidyn"].__version__
 
 
-def _rows(pool: Pool, problem: Problem) -> int:
+def _rows(pool: ShardPool, problem: LoadedSpec) -> int:
     """Samples of a shard: as many as take SHARD_S, as the first ones show; whole blocks."""
     block = block_rows(problem)
     if sample_count(problem.spec) <= block:
@@ -183,7 +183,7 @@ def _rows(pool: Pool, problem: Problem) -> int:
     return -(-rows // block) * block
 
 
-def _seconds(problem: Problem) -> float:
+def _seconds(problem: LoadedSpec) -> float:
     """How long a sample takes [s], compiled; in the process that will work."""
     most = sample_count(problem.spec)
     count, seconds = min(block_rows(problem), most), 0.0
@@ -198,7 +198,7 @@ def _seconds(problem: Problem) -> float:
     return max(seconds / count, 1e-9)
 
 
-def _run(home: Folder, shards: list[int], function: Function | None, pool: Pool, progress: Progress) -> None:
+def _run(home: Folder, shards: list[int], function: Function | None, pool: ShardPool, progress: Progress) -> None:
     """Run shards, whatever happens to one of them. Raises what ends all: an interrupt, a full disk."""
     begun, total = time.monotonic(), len(shards)
     calls = ((shard, (str(home.path), shard, function)) for shard in shards)
@@ -236,16 +236,16 @@ def run_shard(folder: str, shard: int, function: Function | None) -> None:
 
 
 @lru_cache(maxsize=1)
-def _problem(folder: str, manifest: str, function: Function | None) -> Problem:
+def _problem(folder: str, manifest: str, function: Function | None) -> LoadedSpec:
     """The problem of a folder, read once by each process. Raises InputError where this one computes otherwise."""
     home = Folder(Path(folder))
     mine = home.manifest._replace(**_made_by(function, home.manifest.task))
     if differences := home.manifest.differences(mine):
         raise InputError("this worker computes otherwise", got="; ".join(differences), expected="the same version")
-    return Problem(home.spec, home.path, function, home.manifest.inputs)
+    return LoadedSpec(home.spec, home.path, function, home.manifest.inputs)
 
 
-def _columns(problem: Problem, start: int, stop: int) -> dict[str, Any]:
+def _columns(problem: LoadedSpec, start: int, stop: int) -> dict[str, Any]:
     """The columns of a shard."""
     varied = {SAMPLE: np.arange(start, stop), **problem.columns(start, stop)}
     if batched(problem):
@@ -261,5 +261,5 @@ def _columns(problem: Problem, start: int, stop: int) -> dict[str, Any]:
     return varied | (as_table(rows) if fits else as_columns(rows))
 
 
-def _values(sample: Sample) -> str:
+def _values(sample: CampaignSample) -> str:
     return ", ".join(f"{name} = {value}" for name, value in sample.values.items())

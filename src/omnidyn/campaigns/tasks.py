@@ -66,7 +66,7 @@ _FIELD = re.compile(r"(\w+)(?:\[(\d+)\])?", re.ASCII)
 
 
 @dataclass(frozen=True)
-class Sample:
+class CampaignSample:
     """A sample: its index, the robot as it is varied, all its values by key, and a seed of its own."""
 
     index: int
@@ -75,11 +75,11 @@ class Sample:
     seed: int
 
 
-Function = Callable[[Sample], Mapping[str, float]]
+Function = Callable[[CampaignSample], Mapping[str, float]]
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class LoadedSpec:
     """A spec with the files that it names, read from a folder. function: the task of a user, in place of its tables.
 
     hashes: file of a log -> sha256 that it had when the campaign began; empty before it has.
@@ -166,7 +166,7 @@ class Problem:
         for sample in self.samples(0, sample_count(self.spec) // len(task.logs)):
             check_fit(self._fit_task(sample, task), sample.robot)
 
-    def _fit_task(self, sample: Sample, base: IdentifyTask) -> IdentifyTask:
+    def _fit_task(self, sample: CampaignSample, base: IdentifyTask) -> IdentifyTask:
         """[identify] of a sample, the map by where it stands."""
         task: IdentifyTask = _changed(base, "identify", sample.values)
         return task.replace(map=self.name_of(task.map))
@@ -183,9 +183,9 @@ class Problem:
         if name == "controller":
             controller_spec(self.name_of(str(word)))
 
-    def _check_sample(self, sample: Sample) -> None:
+    def _check_sample(self, sample: CampaignSample) -> None:
         if self.function is None and self.spec.track is not None:
-            Loop.of(self, sample, self.spec.track)
+            ClosedLoop.of(self, sample, self.spec.track)
         elif self.function is None and self.spec.simulate is not None:
             commands_of(self, sample, self.spec.simulate)
 
@@ -196,7 +196,7 @@ class Problem:
         triples = zip(self.spec.vary.items(), place.T, nominal, strict=True)
         return {name: numbers(variable, u, value) for (name, variable), u, value in triples}
 
-    def samples(self, start: int, stop: int) -> Iterator[Sample]:
+    def samples(self, start: int, stop: int) -> Iterator[CampaignSample]:
         """The samples start to stop."""
         columns = self.columns(start, stop)
         plain = {
@@ -207,7 +207,7 @@ class Problem:
             robot = self.robot if self.draws is None else self.draws.robot(start + k)
             if "robot" in values:
                 robot = load_robot(self.name_of(str(values["robot"])))
-            yield Sample(start + k, self._varied(robot, values), values, seed_of(self.spec, start + k))
+            yield CampaignSample(start + k, self._varied(robot, values), values, seed_of(self.spec, start + k))
 
     def _varied(self, robot: Robot, values: Mapping[str, Any]) -> Robot:
         """The robot of a sample."""
@@ -220,18 +220,18 @@ class Problem:
                 robot = robot.replace(sensors=table)
         return robot
 
-    def fit(self, sample: Sample) -> Row:
+    def fit(self, sample: CampaignSample) -> Row:
         """What a fit says."""
         assert self.spec.identify is not None
         task = self._fit_task(sample, self.spec.identify)
         return fit_row(str(sample.values[LOG]), sample.robot, task, self.hashes)
 
-    def measure(self, sample: Sample) -> dict[str, float]:
+    def measure(self, sample: CampaignSample) -> dict[str, float]:
         """What is measured of a sample, by name."""
         if self.function is not None:
             measured = _checked(self.function(sample))
         elif self.spec.track is not None:
-            measured = Loop.of(self, sample, self.spec.track).measure()
+            measured = ClosedLoop.of(self, sample, self.spec.track).measure()
         else:
             assert self.spec.simulate is not None
             measured = _simulated(self, sample, self.spec.simulate)
@@ -280,7 +280,7 @@ def _changed(task: Any, head: str, values: Mapping[str, Any]) -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class Loop:
+class ClosedLoop:
     """A closed loop: the controller believes in the robot of the file, and drives that of the sample."""
 
     plant: Robot
@@ -291,7 +291,7 @@ class Loop:
     settling: float
 
     @classmethod
-    def of(cls, problem: Problem, sample: Sample, base: TrackTask) -> Loop:
+    def of(cls, problem: LoadedSpec, sample: CampaignSample, base: TrackTask) -> ClosedLoop:
         """Of a sample."""
         task: TrackTask = _changed(base, "track", sample.values)
         route = path_named(
@@ -328,7 +328,7 @@ class Loop:
         return dict(zip(TRACK_METRICS, measured, strict=True))
 
 
-def commands_of(problem: Problem, sample: Sample, base: SimulateTask) -> HeldCommands:
+def commands_of(problem: LoadedSpec, sample: CampaignSample, base: SimulateTask) -> HeldCommands:
     """What a simulation of a sample is given."""
     task: SimulateTask = _changed(base, "simulate", sample.values)
     if task.voltage is None:
@@ -340,7 +340,7 @@ def commands_of(problem: Problem, sample: Sample, base: SimulateTask) -> HeldCom
     return HeldCommands(KINDS[0], volts, np.full(rows, task.duration / rows), 0.0, "")
 
 
-def _simulated(problem: Problem, sample: Sample, base: SimulateTask) -> dict[str, float]:
+def _simulated(problem: LoadedSpec, sample: CampaignSample, base: SimulateTask) -> dict[str, float]:
     """Where a robot comes to under given commands."""
     held = commands_of(problem, sample, base)
     applied: dict[str, Any] = {held.kind: held.rows, "dt": held.dt, "supply": held.supply}

@@ -14,7 +14,7 @@ import typer
 import omnidyn
 from omnidyn.attempts import Attempts, not_made
 from omnidyn.cli import log_options as options
-from omnidyn.cli.identify_logs import Loaded
+from omnidyn.cli.identify_logs import MOTOR_TABLE, Loaded, LogReading, load_data, table_kind
 from omnidyn.cli.identify_show import Out, say_written
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal import identify_options
@@ -27,7 +27,7 @@ from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import end_failed, tell
 from omnidyn.document import apart, sentence
 from omnidyn.files import check_output
-from omnidyn.identification.methods import OutputError, SteadyState
+from omnidyn.identification.methods import FRICTION_METHODS, MOTOR_METHODS, Method, OutputError, SteadyState
 from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
@@ -77,12 +77,9 @@ def identify(
     speed, or from a table of steady points. The answer carries standard errors, 95 % intervals and warnings in words,
     and says what the data cannot tell.
     """
-    from omnidyn.cli.identify_logs import Reading, is_motor_table, is_steady_table
-    from omnidyn.cli.identify_show import Out, tell_table
-
     request, to = identify_options.identify_request(given), Out(report, out, force, json, full)
     if not robot and request.what != MOTORS:
-        of_motors = len(logs) == 1 and os.path.isfile(logs[0]) and is_motor_table(logs[0])
+        of_motors = os.path.isfile(logs[0]) and table_kind(logs) == MOTOR_TABLE
         table = f" {logs[0]} is a table of motors: say --what motors, which needs no robot." if of_motors else ""
         raise typer.BadParameter(f"Missing option '--robot'.{table}")
     for path in (out, report):  # before any work
@@ -90,43 +87,32 @@ def identify(
             check_output(path, force)
     options.keep_inputs(logs, [robot], [flags.map_file], out, report, flags.save_map)
     options.refuse_missing(logs)
-    if request.what != MOTORS and len(logs) == 1 and is_steady_table(logs[0]):
-        tell_table(logs[0], robot, request, to)
-        return
-    if request.what == MOTORS and len(logs) == 1 and flags.rate is None and is_motor_table(logs[0]):
-        tell_motor_table(logs[0], robot, request, to)
-        return
-    _identify(logs, robot, request, Reading(flags.options(), flags.sort, flags.maps(force)), to)
+    _identify(logs, robot, request, LogReading(flags.options(), flags.sort, flags.maps(force)), to)
 
 
-def _identify(arguments: list[str], robot: str, request: IdentifyRequest, reading: Any, to: Any) -> None:
+def _identify(arguments: list[str], robot: str, request: IdentifyRequest, reading: LogReading, to: Out) -> None:
     """Read, choose the method, identify, tell."""
-    from omnidyn.cli.identify_logs import load_runs
-    from omnidyn.cli.identify_show import load_meanwhile, outputs, tell
-    from omnidyn.identification.default_method import as_driven, default_method
+    from omnidyn.cli.identify_show import load_meanwhile, outputs
+    from omnidyn.cli.identify_show import tell as tell_fits
     from omnidyn.identification.first_runs import shared_out
 
     with shown_progress("reading") as progress:
         start = omnidyn.load_robot(robot) if robot else None
-        loaded = load_runs(arguments, request, start, reading, progress)
+        loaded = load_data(arguments, request, start, reading, progress)
         record = provenance([*([robot_input(robot)] if robot else []), *loaded.inputs])
-        if request.what == MOTORS:
-            run_motors(request, loaded, start, record, to, progress)
-            return
-        assert start is not None
-        method = request.method or default_method(loaded.runs, as_driven(start, loaded.runs), progress)[0]
-        groups = request.groups
+        method, groups = _method(loaded, request, start, progress), request.groups
         if loaded.folders and isinstance(method, SteadyState):
             groups = loaded.folders
-        elif loaded.folders:
+        elif loaded.folders and isinstance(method, OutputError):
             progress(Report("all folders are fitted together; `per` NAME=GLOB makes groups of them", urgent=True))
         if groups:
             names = dict.fromkeys(pattern.partition("=")[0] for pattern in groups)
             outputs(to, [*names], record["inputs"])  # refused before any work
-        load_meanwhile(to, request.quick)
-        with shared_out(start) if isinstance(method, OutputError) else nullcontext():
+        if isinstance(method, FRICTION_METHODS):
+            load_meanwhile(to, request.quick)
+        with shared_out(start) if start and isinstance(method, OutputError) else nullcontext():
             result = omnidyn.identify(
-                loaded.runs,
+                loaded.data,
                 start,
                 method,
                 hold_out=request.hold_out,
@@ -140,41 +126,27 @@ def _identify(arguments: list[str], robot: str, request: IdentifyRequest, readin
             attempts = result.after.attempts
         if result.interrupted:
             progress(Report("interrupted: the numbers are the best so far, not the best there are", urgent=True))
-        tell(result, attempts, record, to, progress)
+        if isinstance(result.method, MOTOR_METHODS):
+            _tell(cast("MotorStudy", result.study), start, record, to, progress)
+            return
+        tell_fits(result, attempts, record, to, progress, of_points=not isinstance(loaded.data, list))
     if result.failures:
         end_failed(result.verdict)
 
 
-# The part of `omnidyn identify` for motors: fit them, write the robot file and the page, show the result
+def _method(loaded: Loaded, request: IdentifyRequest, robot: Robot | None, progress: Progress) -> Method | None:
+    """The method that is asked for, else that of robot and logs; None of a table, which says it."""
+    from omnidyn.identification.default_method import as_driven, default_method, default_motor_method
+
+    if request.method or not isinstance(loaded.data, list):
+        return request.method
+    if request.what == MOTORS:
+        return default_motor_method(loaded.data, request.input, progress)
+    assert robot is not None
+    return default_method(loaded.data, as_driven(robot, loaded.data), request.hold_out, progress)[0]
 
 
-def run_motors(
-    request: IdentifyRequest, loaded: Loaded, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
-) -> None:
-    """Choose the method, fit; write robot file and report; show the result."""
-    from omnidyn.identification.default_method import default_motor_method
-
-    method = request.method or default_motor_method(loaded.runs, request.input, progress)
-    result = omnidyn.identify(
-        loaded.runs, robot, method, hold_out=request.hold_out, progress=progress, check=loaded.logs
-    )
-    _tell(cast("MotorStudy", result.study), robot, record, to, progress)
-
-
-def tell_motor_table(table: str, robot: str, request: IdentifyRequest, to: Out) -> None:
-    """The same from a table input,speed[,motor], which has no time."""
-    from omnidyn.logs.motor_table import read_motor_table
-
-    start, data = omnidyn.load_robot(robot) if robot else None, read_motor_table(table)
-    study = omnidyn.identify(data, start, request.method).study
-    inputs = [{"role": "data", "name": table, "sha256": data.sha256}]
-    _tell(
-        cast("MotorStudy", study),
-        start,
-        provenance([*([robot_input(robot)] if robot else []), *inputs]),
-        to,
-        lambda _: None,
-    )
+# The part of `omnidyn identify` for motors: write the robot file and the page, show the result
 
 
 def _tell(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress) -> None:

@@ -8,21 +8,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from omnidyn.cli.log_options import Maps, load_logs, log_files
-from omnidyn.cli.terminal.identify_options import IdentifyRequest
+from omnidyn.cli.terminal.identify_options import MOTORS, IdentifyRequest
 from omnidyn.cli.terminal.streams import say
 from omnidyn.files import open_regular
 from omnidyn.progress import Progress
 
 if TYPE_CHECKING:
     from omnidyn.logs.log import Log
+    from omnidyn.logs.motor_table import MotorTable
     from omnidyn.logs.read_log import LogOptions
+    from omnidyn.logs.steady_table import SteadyTable
     from omnidyn.model.robot import Robot
     from omnidyn.run import Run
 
 SNIFF_BYTES, SHOWN_NOTES = 64 * 2**10, 12
+STEADY_TABLE, MOTOR_TABLE = "steady table", "motor table"
 
 
-class Reading(NamedTuple):
+class LogReading(NamedTuple):
     """How logs are read."""
 
     options: LogOptions
@@ -31,25 +34,24 @@ class Reading(NamedTuple):
 
 
 class Loaded(NamedTuple):
-    """Runs, logs, the record of the files, and NAME=FOLDER of each folder where LOG... is several."""
+    """data: runs, or a table of steady points or of motors. logs: behind the runs. inputs: the record of the files.
+    folders: NAME=FOLDER of each folder where LOG... is several."""
 
-    runs: list[Run]
+    data: list[Run] | SteadyTable | MotorTable
     logs: list[Log]
     inputs: list[dict[str, str]]
-    folders: tuple[str, ...]
+    folders: tuple[str, ...] = ()
 
 
-def is_steady_table(path: str) -> bool:
-    """Whether a file is a table axis,speed,force: told by the names of its columns."""
-    names = _first_names(path)
-    return "axis" in names and bool(names & {"speed", "force"})
+def table_kind(arguments: Sequence[str]) -> str:
+    """What LOG... is by the names of its columns: STEADY_TABLE axis,speed,force, MOTOR_TABLE input,speed[,motor], or
+    "" for logs."""
+    from omnidyn.logs.motor_table import is_motor_table
 
-
-def is_motor_table(path: str) -> bool:
-    """Whether a file is a table input,speed[,motor]: told by the names of its columns."""
-    from omnidyn.logs import motor_table
-
-    return motor_table.is_motor_table(_first_names(path))
+    names = _first_names(arguments[0]) if len(arguments) == 1 else set()
+    if "axis" in names and names & {"speed", "force"}:
+        return STEADY_TABLE
+    return MOTOR_TABLE if is_motor_table(names) else ""
 
 
 def _first_names(path: str) -> set[str]:
@@ -64,20 +66,38 @@ def _first_names(path: str) -> set[str]:
     return {cell.strip().strip('"').lower() for cell in cells}
 
 
-def load_runs(
-    arguments: Sequence[str], request: IdentifyRequest, robot: Robot | None, reading: Reading, progress: Progress
+def load_data(
+    arguments: Sequence[str], request: IdentifyRequest, robot: Robot | None, reading: LogReading, progress: Progress
+) -> Loaded:
+    """What LOG... holds: one table of steady points or of motors, else logs."""
+    from omnidyn.logs.motor_table import read_motor_table
+    from omnidyn.logs.steady_table import read_steady_table
+
+    kind = table_kind(arguments)
+    if kind == STEADY_TABLE and request.what != MOTORS:
+        table: SteadyTable | MotorTable = read_steady_table(arguments[0])
+    elif kind == MOTOR_TABLE and request.what == MOTORS and reading.options.rate is None:
+        table = read_motor_table(arguments[0])
+    else:
+        return _load_runs(arguments, request, robot, reading, progress)
+    return Loaded(table, [], [{"role": "data", "name": arguments[0], "sha256": table.sha256}])
+
+
+def _load_runs(
+    arguments: Sequence[str], request: IdentifyRequest, robot: Robot | None, reading: LogReading, progress: Progress
 ) -> Loaded:
     """The runs of LOG... that belong to a group, where there are any; what the readers had to decide is said once."""
     files = log_files(arguments)
     folders = () if request.groups else _folders(arguments)
     used_files = _of_groups(files, request.groups or folders, request.group_option)
-    loaded, notes = Loaded([], [], [], folders), {}
+    runs: list[Run] = []
+    loaded, notes = Loaded(runs, [], [], folders), {}
     for path, log in load_logs(used_files, robot, reading.options, progress):
         reading.maps.show(path, log.columns)
         run = log.to_run(sort=reading.sort)
         for words in run.warnings:
             notes.setdefault(words, []).append(path)
-        loaded.runs.append(run)
+        runs.append(run)
         loaded.logs.append(log)
         loaded.inputs.append({"role": "log", "name": path, "sha256": log.sha256})
     _say_notes(notes, len(used_files))

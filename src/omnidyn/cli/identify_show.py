@@ -12,9 +12,6 @@ from typing import TYPE_CHECKING, Any
 import omnidyn
 from omnidyn.attempts import Attempts
 from omnidyn.cli.terminal.flags import with_flags
-from omnidyn.cli.terminal.identify_options import IdentifyRequest
-from omnidyn.cli.terminal.progress import shown_progress
-from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import brief_document
 from omnidyn.cli.terminal.telling import tell as tell_document
@@ -88,17 +85,27 @@ def load_meanwhile(to: Out, quick: bool) -> None:
     threading.Thread(target=load).start()
 
 
-def tell(result: Identification, attempts: Attempts, record: dict[str, Any], to: Out, progress: Progress) -> None:
-    """Draw the page of an identification, and show the result."""
+def tell(
+    result: Identification,
+    attempts: Attempts,
+    record: dict[str, Any],
+    to: Out,
+    progress: Progress,
+    of_points: bool = False,
+) -> None:
+    """Draw the page of an identification, and show the result. of_points: of a table of steady points, one estimate."""
     report = ""
     if to.report:
         progress(Report("drawing"))
         report = to.write_report(attempts, lambda: _page(result, record))
     progress(Report("writing"))
-    written = [*to.files.values(), *([report] if report else [])]
-    document = result.document() if to.json or to.full else brief(result)
-    tell_document(document, to.json, record, output=to.files or None, report=report or None)
-    say_written(written)
+    files = [*to.files.values()]
+    if of_points:
+        document, output = result.estimate.document(), files[0] if files else None
+    else:
+        document, output = result.document() if to.json or to.full else brief(result), to.files or None
+    tell_document(document, to.json, record, output=output, report=report or None)
+    say_written([*files, *([report] if report else [])])
     to.finish(attempts)
 
 
@@ -116,22 +123,6 @@ def _page(result: Identification, record: dict[str, Any]) -> str:
     from omnidyn.report.fit_page import render_fit
 
     return render_fit(result, record)
-
-
-def tell_table(table: str, robot: str, request: IdentifyRequest, to: Out) -> None:
-    """The paper's way, from a table of steady points; what the reader had to decide joins the warnings."""
-    attempts, report = Attempts(), ""
-    with shown_progress("identifying"):
-        start, data = omnidyn.load_robot(robot), omnidyn.read_steady_table(table)
-        result = omnidyn.identify(data, start, request.method)
-        record = provenance([robot_input(robot), {"role": "data", "name": table, "sha256": data.sha256}])
-        to.save({"": result.estimate.robot}, record["inputs"])
-        if to.report:
-            report = to.write_report(attempts, lambda: _page(result, record))
-    document = result.estimate.document()
-    tell_document(document, to.json, record, output=to.files.get(""), report=report or None)
-    say_written([*to.files.values(), report])
-    to.finish(attempts)
 
 
 def outputs(to: Out, names: Sequence[str], inputs: Sequence[Mapping[str, str]] = ()) -> dict[str, str]:

@@ -13,7 +13,7 @@ from omnidyn.model.actuation import asked_voltage
 from omnidyn.model.motor import DYNAMIC, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.simulation.exact.march import why_not_exact
+from omnidyn.simulation.exact.exact_march import why_not_exact
 from omnidyn.statement import Statement
 
 OUTPUTS = ("twist", "wheel_speed", "wheel_angle", "current", "pose")  # what a model predicts

@@ -59,7 +59,7 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[Statement]:
     one explains the same in another way, and both together would be one too many.
     """
     lack = fit.lack_of_fit
-    if lack is None or not lack.found or fit.not_followed:
+    if lack is None or not lack.found or lack.is_small or fit.not_followed:
         return
     near_causes = (
         cause for cause in lack.causes if cause.confident and cause.chi2 >= SIMILAR_SHARE * lack.causes[0].chi2
@@ -136,4 +136,5 @@ def _wide(fit: OutputErrorEstimate) -> Iterator[Statement]:
 
 def _misses(fit: OutputErrorEstimate) -> bool:
     """Whether the model leaves out more than noise."""
-    return fit.lack_of_fit is not None and fit.lack_of_fit.found
+    lack = fit.lack_of_fit
+    return lack is not None and lack.found and not lack.is_small

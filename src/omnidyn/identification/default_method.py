@@ -49,9 +49,14 @@ def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
     return why_no_transient(runs, robot)
 
 
-def default_method(runs: Sequence[Run], robot: Robot, progress: Progress) -> tuple[Method, str]:
-    """(the method that robot and logs support, why it is not output error, "" where it is); `progress` hears why."""
-    reason = why_not_output_error(runs, robot)
+def default_method(
+    runs: Sequence[Run], robot: Robot, hold_out: Sequence[str], progress: Progress
+) -> tuple[Method, str]:
+    """(the method that robot and logs support, why it is not output error, "" where it is); `progress` hears why.
+
+    hold_out: of `identify`; only output error predicts logs.
+    """
+    reason = "" if hold_out else why_not_output_error(runs, robot)
     if reason:
         progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {reason}", urgent=True))
     return (SteadyState() if reason else OutputError()), reason

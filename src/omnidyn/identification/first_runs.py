@@ -25,7 +25,7 @@ from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.batch.batch import simulate_batch
 from omnidyn.simulation.batch.result import BatchRun
-from omnidyn.simulation.exact.march import why_not_exact
+from omnidyn.simulation.exact.exact_march import why_not_exact
 from omnidyn.simulation.simulate import simulate
 
 ROWS, HOLD, DT = 200, 40, 0.01  # rows of a run; rows and [s] that a command holds

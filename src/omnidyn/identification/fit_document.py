@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from omnidyn.document import Document, Part, Points, Table, apart, interval_cell
 from omnidyn.findings.finding import Verdict
 from omnidyn.identification.estimate import NOT_DETERMINED
-from omnidyn.identification.lack_of_fit import Diagnosis
+from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.log_verdicts import checked
 from omnidyn.identification.methods import OUTPUT_ERROR
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
@@ -34,15 +34,15 @@ def fit_document(
     for group, fit in fits.items():
         validation_documents = [validations[group].document()] if group in validations else []
         documents = [fit.document(), *validation_documents]
-        diagnosis = fit.diagnosis
+        diagnosis, lack = fit.diagnosis, fit.lack_of_fit
         blocks += [[f"group {group}"] if len(fits) > 1 else [], *(document.parts for document in documents)]
         blocks += [[Points([fit.held_out.statement()])]] if fit.held_out else []
         blocks += [fit.ladder.parts()] if fit.ladder and group in last else []
-        blocks += _found(diagnosis) if diagnosis and not fit.not_followed else []
+        blocks += _found(lack, diagnosis) if diagnosis and lack and not fit.not_followed else []
         groups[group] = {
             **fit.to_dict(),
             "validation": validation_documents[0].data if validation_documents else None,
-            "lack_of_fit": diagnosis.lack_of_fit.to_dict() if diagnosis else None,
+            "lack_of_fit": lack.to_dict() if lack else None,
             "rests_on": fit.rests_on,
             "stability": diagnosis.stability.to_dict() if diagnosis else None,
         }
@@ -58,11 +58,11 @@ def fit_document(
     return Document(apart(*blocks), data, [words for fit in fits.values() for words in fit.warnings], ascii=True)
 
 
-def _found(diagnosis: Diagnosis) -> list[Sequence[Part]]:
+def _found(lack: LackOfFit, diagnosis: Diagnosis) -> list[Sequence[Part]]:
     """What the model leaves out, what is not the same throughout the logs, and what the numbers rest on."""
     sensitivity_table, stability = diagnosis.table(), diagnosis.stability
     return [
-        diagnosis.lack_of_fit.parts(),
+        lack.parts(),
         stability.parts(),
         ["what each number rests on:", sensitivity_table] if sensitivity_table else [],
     ]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from time import process_time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from omnidyn.arguments import MADE_BY, check_order, is_frame
 from omnidyn.attempts import BY_QUICK, COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, Attempts
@@ -40,9 +40,7 @@ from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.steady.steady_state import fit_steady_state, identify_lines
 from omnidyn.identification.steady.study import diagnosed, fit_steady, undiagnosed
 from omnidyn.identification.validation import validate
-from omnidyn.identification.verdict import (
-    of_group,
-)
+from omnidyn.identification.verdict import of_group
 from omnidyn.identification.whole_logs import solved
 from omnidyn.logs.log import Log
 from omnidyn.logs.motor_table import MotorTable
@@ -52,9 +50,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
 from omnidyn.statement import NOTE, WARNING, Statement, statements
-
-if TYPE_CHECKING:
-    pass
 
 Logs = Run | Log | Sequence[Run | Log] | SteadyTable | MotorTable
 Save = Callable[[Mapping[str, Estimate]], object]
@@ -107,7 +102,7 @@ def identify(
     """
     check_order("identify(logs, robot)", (logs, (Run, Log, SteadyTable, MotorTable)), (robot, (Robot, type(None))))
     refuse_unless_method(method)
-    request = _Asked(
+    request = _Request(
         robot,
         groups,
         (hold_out,) if isinstance(hold_out, str) else tuple(hold_out),
@@ -128,9 +123,7 @@ def identify(
     reason = ""
     request = replace(request, robot=as_driven(request.of_friction(), runs))
     if method is None:
-        method, reason = (
-            (OutputError(), "") if request.hold_out else default_method(runs, request.of_friction(), progress)
-        )
+        method, reason = default_method(runs, request.of_friction(), request.hold_out, progress)
     request.refuse(method)
     if isinstance(method, SteadyState):
         identification = _steady(runs, method, check, request)
@@ -150,7 +143,7 @@ def identify(
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Request:
     """What is asked beside the method, who hears what is done, who takes estimates, and what was not made.
 
     fit_time [s]: processor time of the fit.
@@ -206,7 +199,7 @@ def _discard(message: object) -> None:
     """Discards what is told."""
 
 
-def _of_steady_table(table: SteadyTable, method: Method, request: _Asked) -> Identification:
+def _of_steady_table(table: SteadyTable, method: Method, request: _Request) -> Identification:
     """The paper's line on each axis."""
     if not isinstance(method, SteadyState):
         raise InputError(
@@ -224,7 +217,7 @@ def _of_steady_table(table: SteadyTable, method: Method, request: _Asked) -> Ide
 
 
 def _of_motors(
-    runs: Sequence[Run] | MotorTable, method: Method, check: Sequence[Log], request: _Asked
+    runs: Sequence[Run] | MotorTable, method: Method, check: Sequence[Log], request: _Request
 ) -> Identification:
     """Every motor of some logs, or of a table."""
     from omnidyn.identification.motors.study import study_motors, study_points  # imported lazily: slow to load
@@ -246,7 +239,7 @@ def _of_motors(
     return Identification(method, {}, request.without_more(study.verdicts, study.advice), study=study)
 
 
-def _steady(runs: Sequence[Run], method: SteadyState, check: Sequence[Log], request: _Asked) -> Identification:
+def _steady(runs: Sequence[Run], method: SteadyState, check: Sequence[Log], request: _Request) -> Identification:
     robot = request.of_friction()
     verdicts = log_verdicts(check, robot, request.progress)
     names = names_of_groups(request.groups, [run.source for run in runs])
@@ -271,7 +264,7 @@ def _steady(runs: Sequence[Run], method: SteadyState, check: Sequence[Log], requ
     return Identification(method, study.estimates, follow_up, study.differences, study)
 
 
-def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], request: _Asked) -> Identification:
+def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], request: _Request) -> Identification:
     robot = request.of_friction()
     if robot.drive.kind == SPEED and (reason := why_not_output_error(runs, robot)):
         words = f"{reason}; `method` {STEADY_STATE} answers in seconds"
@@ -320,7 +313,7 @@ def _after(
     verdicts: tuple[Verdict, ...],
     check: Sequence[Log],
     repeat_notes: Sequence[Statement],
-    request: _Asked,
+    request: _Request,
 ) -> After:
     """What follows fits to whole logs. runs_of_group, held_out_runs: group -> the runs it was fitted to, and those held
     out of it.
@@ -345,7 +338,7 @@ def _after(
     return After(fits, validations, verdicts, tuple(steps), attempts)
 
 
-def _diagnosed(fits: Mapping[str, OutputErrorEstimate], request: _Asked) -> dict[str, OutputErrorEstimate]:
+def _diagnosed(fits: Mapping[str, OutputErrorEstimate], request: _Request) -> dict[str, OutputErrorEstimate]:
     """The fits with their diagnosis; without one where it fails, or is not asked for."""
     if request.quick:
         request.attempts.leave_out(DIAGNOSIS, BY_QUICK)
@@ -383,7 +376,7 @@ def _not_independent(runs: Sequence[Run], held_mask: Sequence[bool]) -> list[Sta
 
 
 def _answered(
-    runs: Sequence[Run], method: OutputError, groups: Sequence[str] | None, request: _Asked
+    runs: Sequence[Run], method: OutputError, groups: Sequence[str] | None, request: _Request
 ) -> tuple[Answer, bool]:
     """(answer, whether an interrupt cut the fit off)."""
     steps = 0

@@ -9,6 +9,7 @@ from typing import Any
 
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Part, Points, Table, all_of, plain, short
+from omnidyn.identification.selection.blocks import BlockComparison
 from omnidyn.identification.stability import Stability
 from omnidyn.model.keys import in_words
 from omnidyn.statement import NOTE, WARNING, Statement, statements
@@ -23,6 +24,7 @@ UNREST_LIMITS = (
     0.001,
     0.1,
 )  # chance, and share, from which on it is said that a robot in motion leaves more than one at rest
+SMALL_MISS = 0.01  # of the spread: a free run that misses less on held-out rows leaves nothing out that has no cause
 LINE_SHARE = 0.01  # share of the variance of a residual that is worth a line
 CHANGED_NUMBERS, SEEN_CHANGE = (
     2,
@@ -106,8 +108,9 @@ class Remedy:
     gain: share of the squared held-out error that it takes away, with its standard error. same_as: keys that the
     log cannot tell from it. share: of all that residuals hold beside noise, that it explains. offered: whether a
     robot file or a fit holds such. chi2: by how much it lowers the sum of squares, in those of the noise; numbers:
-    how many it fits. size, at: its fitted change and where it was tried, both of a first step. changes: number ->
-    (what it is, what it would be with it, to first order). force: where it was fitted to forces at steady state."""
+    how many it fits. comparison: how held-out blocks are predicted with it. size, at: its fitted change and where it
+    was tried, both of a first step. changes: number -> (what it is, what it would be with it, to first order). force:
+    where it was fitted to forces at steady state."""
 
     key: str
     cause: Statement
@@ -122,6 +125,7 @@ class Remedy:
     at: float = 0.0
     changes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     force: Force | None = None
+    comparison: BlockComparison | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cause", *statements([self.cause]))
@@ -184,7 +188,8 @@ class LackOfFit:
     beyond: those whose residuals are larger, by a source that decides. at_rest: the same where the robot rests.
     rounded: output -> share of the variance of its residuals that is of inputs that were rounded, or changed while rows
     are missing, which is no lack of fit, but hides one that is smaller. drifts: whether errors last so long that no
-    test tells them from a misfit. tried: names of what was tried, where all that was tried has one test.
+    test tells them from a misfit. tried: names of what was tried, where all that was tried has one test. missed: what
+    free runs miss on held-out rows, over the spread of the outputs; NaN where none were held out.
     """
 
     found: bool
@@ -201,6 +206,13 @@ class LackOfFit:
     rounded: Mapping[str, float] = field(default_factory=dict)
     drifts: bool = False
     tried: tuple[str, ...] = ()
+    missed: float = math.nan
+
+    @property
+    def is_small(self) -> bool:
+        """Whether free runs on held-out rows miss next to nothing, and no cause explains what is more than noise."""
+        has_cause = bool(self.causes) and (self.causes[0].confident or bool(self.causes[0].rivals))
+        return self.found and not has_cause and self.missed < SMALL_MISS
 
     @property
     def causes(self) -> tuple[Remedy, ...]:
@@ -214,6 +226,8 @@ class LackOfFit:
         worst_channel = max(self.channels, key=lambda name: self.channels[name], default="")
         themes = tuple(theme.theme for theme in self.follows[:2])
         beyond_channel = None if themes or self.causes else self._beyond_noise()
+        if self.is_small:
+            return Statement("misfit_small", NOTE, worst_channel, {"missed": self.missed})
         numbers = {"share": self.channels.get(worst_channel), "follows": themes, "beyond": beyond_channel}
         if not self.causes:
             return Statement("misfit_unexplained", WARNING, worst_channel, numbers)

@@ -70,11 +70,12 @@ def refuse_word(name: str, value: str, known_words: tuple[str, ...]) -> None:
 class Method:
     """How robots are identified. A single name stands for a tuple of it.
 
-    name: on the command line. takes: which arguments of `identify` it has a use for.
-    Raises InputError for words that mean nothing.
+    name: its own. word: of `method` on the command line, which the one for motors shares with that of whole robots.
+    takes: which arguments of `identify` it has a use for. Raises InputError for words that mean nothing.
     """
 
     name: ClassVar[str] = ""
+    word: ClassVar[str] = ""
     takes: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
@@ -168,6 +169,7 @@ class OutputError(Method):
     """Whole logs: the numbers whose free run under the logged inputs comes nearest to all that was measured."""
 
     name: ClassVar[str] = OUTPUT_ERROR
+    word: ClassVar[str] = OUTPUT_ERROR
     takes: ClassVar[tuple[str, ...]] = (HOLD_OUT, GROUPS, QUICK)
 
     free: tuple[str, ...] | None = option(
@@ -241,6 +243,7 @@ class SteadyState(Method):
     """Friction from stretches of constant speed, or from a table of steady points (the paper's way)."""
 
     name: ClassVar[str] = STEADY_STATE
+    word: ClassVar[str] = STEADY_STATE
     takes: ClassVar[tuple[str, ...]] = (GROUPS, QUICK)
 
     shape: str = option(
@@ -265,7 +268,8 @@ class SteadyState(Method):
 class MotorLine(Method):
     """The line of each motor, input against speed, wheels off the ground: from windows, or from a table of motors."""
 
-    name: ClassVar[str] = STEADY_STATE
+    name: ClassVar[str] = "motor-line"
+    word: ClassVar[str] = STEADY_STATE
 
     input: str = option("", MOTOR_INPUT)
     speed: Literal["wheel", "set", "ground"] = option("wheel", SPEED)
@@ -279,7 +283,8 @@ class MotorLine(Method):
 class MotorFit(Method):
     """Each motor as a free run of whole logs, wheels off the ground: by what improves held-out blocks, and plain."""
 
-    name: ClassVar[str] = OUTPUT_ERROR
+    name: ClassVar[str] = "motor-fit"
+    word: ClassVar[str] = OUTPUT_ERROR
     takes: ClassVar[tuple[str, ...]] = (HOLD_OUT,)
 
     input: str = option("", MOTOR_INPUT)

@@ -80,13 +80,15 @@ def with_size(fit: Fit, solution: Solution, runs: Sequence[Run], progress: FitPr
         return fit, solution
     margins = margins_of([solution, wider_solution])
     narrow_run, wide_run = free_run(solution, margins), free_run(wider_solution, margins)
-    if not wide_run.is_better(narrow_run):
+    comparison = wide_run.improvement(narrow_run)
+    if comparison is None:
         return fit, solution
     numbers = {
         "latency": late_notes[0].numbers["latency"],
         "keys": tuple(size_keys),
         "error": narrow_run.error,
         "with": wide_run.error,
+        **comparison.counts,
     }
     size_note = Statement("size_fitted", WARNING, numbers=numbers)
     return wider_fit, replace(
@@ -97,16 +99,27 @@ def with_size(fit: Fit, solution: Solution, runs: Sequence[Run], progress: FitPr
 
 
 def _late(solution: Solution) -> list[Statement]:
-    """The latencies that are more than LATE_ROWS rows above that of the drive."""
+    """The latencies that are more than LATE_ROWS rows above that of the drive, beside what is predicted without."""
     problem = solution.solver.problem
     assert isinstance(problem, Problem)
     step, count = max(piece.step for piece in problem.pieces), problem.robot_count
-    return [
-        Statement("late_by_rows", WARNING, parameter.name.partition(".")[2], {"latency": value, "rows": value / step})
+    late = {
+        parameter.name.partition(".")[2]: value
         for parameter, value in zip(
             problem.parameters[count:], solution.state.point.values[count:].tolist(), strict=True
         )
         if parameter.part == LATENCY and value - problem.robot.drive.latency > LATE_ROWS * step
+    }
+    beside = {"error": None, "without": None}
+    if late and (plain_solution := solution.plain_solution) is not None:
+        margins = margins_of([solution, plain_solution])
+        beside = {
+            "error": free_run(solution, margins).error,
+            "without": free_run(plain_solution, margins).error,
+        }
+    return [
+        Statement("late_by_rows", WARNING, name, {"latency": value, "rows": value / step, **beside})
+        for name, value in late.items()
     ]
 
 

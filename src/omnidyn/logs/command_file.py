@@ -18,7 +18,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.run_file import columns_of, refuse_other_units
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 
 MAX_STEPS = 10_000_000
 KINDS = ("voltage", "duty", "wheel_speed_command", "twist_command")
@@ -49,28 +49,14 @@ class HeldCommands:
         return self.rows
 
     def __iter__(self) -> Iterator[Any]:
-        """Unpacks as `voltage, dt, t0, sha256 = read_voltages(...)`."""
+        """Unpacks as `voltage, dt, t0, sha256 = read_commands(...)`."""
         return iter((self.voltage, self.dt, self.t0, self.sha256))
-
-
-def read_voltages(
-    path: str | os.PathLike, wheels: int, duration: float | None = None, max_steps: int = MAX_STEPS
-) -> HeldCommands:
-    """Read a voltage file for a robot of `wheels` wheels; see `read_commands`, of which only volts are taken.
-
-    Args:
-        path: The file.
-        wheels: Number of wheels.
-        duration: Of all rows together [s].
-        max_steps: Largest number of rows.
-    """
-    return _read(path, wheels, duration, max_steps, KINDS[:1])
 
 
 def read_commands(
     path: str | os.PathLike, wheels: int, duration: float | None = None, max_steps: int = MAX_STEPS
 ) -> HeldCommands:
-    """Read a command file for a robot of `wheels` wheels.
+    """Read a command file, such as one of voltages, for a robot of `wheels` wheels.
 
     Each row holds until the next. The last row holds as long as the one before it, or until `duration` [s] after the
     first row; a file of one row needs `duration`. Rows that begin after the duration are left out, with a note.
@@ -84,16 +70,10 @@ def read_commands(
 
     Raises InputError for wrong columns, times that do not increase, more than `max_steps` rows, a bad duration.
     """
-    return _read(path, wheels, duration, max_steps, KINDS)
-
-
-def _read(
-    path: str | os.PathLike, wheels: int, duration: float | None, max_steps: int, kinds: tuple[str, ...]
-) -> HeldCommands:
     if duration is not None and not (0.0 < duration < np.inf):
         raise InputError("cannot simulate for that long", got=duration, expected="a duration above 0 s")
     table = read_table(path)
-    kind = next((kind for kind in kinds if _numbered(table, kind)), kinds[0])
+    kind = next((kind for kind in KINDS if _numbered(table, kind)), KINDS[0])
     _check_columns(table, kind, wheels)
     if len(table) > max_steps:
         raise InputError(
@@ -115,7 +95,7 @@ def _read(
     return HeldCommands(kind, rows[:row_count], dt, float(t[0]), table.sha256, battery, notes)
 
 
-def _numbered(table: Table, kind: str) -> list[str]:
+def _numbered(table: FileTable, kind: str) -> list[str]:
     """The columns of the table that belong to a kind of command, for any number of wheels."""
     if kind == "twist_command":
         return [name for name in table.names if name in columns_of(kind, 0)]
@@ -123,7 +103,7 @@ def _numbered(table: Table, kind: str) -> list[str]:
     return [name for name in table.names if re.fullmatch(pattern, name)]
 
 
-def _check_columns(table: Table, kind: str, wheels: int) -> None:
+def _check_columns(table: FileTable, kind: str, wheels: int) -> None:
     expected = ["t_s", *columns_of(kind, wheels)]
     optional = ["supply_V"] if kind == "duty" else []
     input_columns = _numbered(table, kind)
@@ -140,7 +120,7 @@ def _check_columns(table: Table, kind: str, wheels: int) -> None:
     refuse_other_units(table)
 
 
-def _check_time(table: Table, t: FloatArray) -> None:
+def _check_time(table: FileTable, t: FloatArray) -> None:
     bad_steps = np.flatnonzero(~(np.diff(t) > 0.0))
     if bad_steps.size:
         row = int(bad_steps[0]) + 1
@@ -155,7 +135,7 @@ def _check_time(table: Table, t: FloatArray) -> None:
         )
 
 
-def _intervals(table: Table, t: FloatArray, duration: float | None) -> tuple[FloatArray, int]:
+def _intervals(table: FileTable, t: FloatArray, duration: float | None) -> tuple[FloatArray, int]:
     """How long each row holds [s], and how many rows there are within the duration."""
     if len(t) == 1 and duration is None:
         raise InputError(

@@ -22,7 +22,7 @@ from omnidyn.logs.read_log import LogOptions, map_columns
 from omnidyn.logs.readers.read_table import iter_tables, reader_of
 from omnidyn.logs.readers.reader import ReadOptions, completed
 from omnidyn.logs.readers.recording import Topic
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, silent
 from omnidyn.statement import Statement, statements
@@ -198,12 +198,12 @@ def _of_columns(
     )
 
 
-def _tables(path: str | os.PathLike, options: LogOptions, progress: Progress) -> Iterator[Table]:
+def _tables(path: str | os.PathLike, options: LogOptions, progress: Progress) -> Iterator[FileTable]:
     tables = map(with_joined_stamp, iter_tables(path, PIECE, progress=progress, **options.of_tables))
     return timed(tables, options.rate, options.skip_bad_rows)
 
 
-def _topic(name: str, statistics: _Seen, table: Table, is_taken: bool) -> Topic:
+def _topic(name: str, statistics: _Seen, table: FileTable, is_taken: bool) -> Topic:
     steps = statistics.steps[statistics.steps > 0.0]
     rate = 1.0 / float(np.median(steps)) if steps.size else 0.0
     unit = table.units.get(name, "")

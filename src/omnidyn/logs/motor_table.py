@@ -18,7 +18,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 
 # column -> (kind, unit, size of one in that unit)
 _INPUTS: dict[str, tuple[str, str, float]] = {
@@ -135,7 +135,7 @@ def _refuse_log(put_in: FloatArray, speed: FloatArray, motor: IntArray, source: 
         )
 
 
-def _speed_size(table: Table, name: str, bare: str) -> float:
+def _speed_size(table: FileTable, name: str, bare: str) -> float:
     """rad/s in one unit of the column."""
     unit = table.units.get(name, "")
     if bare != "speed" or not unit:
@@ -151,7 +151,7 @@ def _speed_size(table: Table, name: str, bare: str) -> float:
     return _SPEED_UNITS[unit]
 
 
-def _motors(table: Table, name: str) -> IntArray:
+def _motors(table: FileTable, name: str) -> IntArray:
     """Numbers from 0."""
     numbers = table.measured(name)
     bad_rows = np.flatnonzero((numbers < 1.0) | (numbers != np.round(numbers)) | (numbers > 1000.0))

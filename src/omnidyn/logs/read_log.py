@@ -32,7 +32,7 @@ from omnidyn.logs.readers.read_table import iter_tables, read_table, reader_of
 from omnidyn.logs.readers.reader import ReadOptions, completed
 from omnidyn.logs.readers.recording import Recording, Track
 from omnidyn.logs.table.dialect import split_unit
-from omnidyn.logs.table.table import ROWS, Table, join
+from omnidyn.logs.table.table import ROWS, FileTable, join
 from omnidyn.model.frames import unwrapped
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import MIN_WHEELS, wheel_speed
@@ -164,7 +164,7 @@ def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOp
     return log_from_table(table, map_columns(table, robot, options), robot, options)
 
 
-def map_columns(table: Table, robot: Robot | None, options: LogOptions) -> ColumnMap:
+def map_columns(table: FileTable, robot: Robot | None, options: LogOptions) -> ColumnMap:
     """The map of a table: given or guessed, with the overrides on top. Raises InputError for a column it lacks."""
     columns, overrides = options.columns, dict(parse_column(text, table.names) for text in options.overrides)
     if options.rate is not None:
@@ -191,7 +191,7 @@ def map_columns(table: Table, robot: Robot | None, options: LogOptions) -> Colum
     return columns
 
 
-def _called_as_in(table: Table, columns: ColumnMap) -> ColumnMap:
+def _called_as_in(table: FileTable, columns: ColumnMap) -> ColumnMap:
     """The map with columns called as in the table, where a name in it holds the unit of the header too: "x (in)"."""
     short = {
         key: replace(column, name=bare)
@@ -213,7 +213,7 @@ def _delayed(columns: ColumnMap, latency: Mapping[str, float]) -> ColumnMap:
 
 
 def log_from_table(
-    table: Table, columns: ColumnMap, robot: Robot | None, options: LogOptions, clock: Clock | None = None
+    table: FileTable, columns: ColumnMap, robot: Robot | None, options: LogOptions, clock: Clock | None = None
 ) -> Log:
     """The Log of a table under a map; `clock` has seen the blocks before this one.
 
@@ -385,10 +385,10 @@ def iter_logs(
 
 # Several files of one experiment and one clock as one table: a bag of the robot and a table of motion capture, say
 
-Mapped = Callable[[Table], ColumnMap]
+Mapped = Callable[[FileTable], ColumnMap]
 
 
-def joined_table(paths: Sequence[str | os.PathLike], options: ReadOptions, mapped: Mapped) -> Table:
+def joined_table(paths: Sequence[str | os.PathLike], options: ReadOptions, mapped: Mapped) -> FileTable:
     """The topics and columns of all files, a row for each stamp, blank where a file has nothing there.
 
     mapped(table): which column is what, for the time of a table. A name that two files have is told by the file.

@@ -28,7 +28,7 @@ from omnidyn.logs.channels import components, si_suffix
 from omnidyn.logs.mcap_run import import_mcap, run_to_mcap
 from omnidyn.logs.readers.parquet import SUFFIXES, import_pyarrow, parquet_bytes
 from omnidyn.logs.readers.read_table import READERS, read_table
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.run import CHANNELS, SCALAR, Run, as_run
 from omnidyn.statement import Statement, statements
 from omnidyn.units import DUTY, known_unit, parse_unit
@@ -241,7 +241,7 @@ def _complete(columns: Mapping[str, FloatArray], channel: str, names: list[str],
     return values[:, 0] if CHANNELS[channel] == SCALAR else values
 
 
-def refuse_other_units(table: Table) -> None:
+def refuse_other_units(table: FileTable) -> None:
     """Raises InputError where a unit given in a row or a bracket is not the one in the name of the column."""
     for name, text in table.units.items():
         name_unit, table_unit = parse_unit(unit_of_column(name)), known_unit(text)

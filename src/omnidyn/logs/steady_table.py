@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.model.frames import AXES
 from omnidyn.statement import Statement
 
@@ -162,13 +162,13 @@ def read_steady_table(path: str | os.PathLike) -> SteadyTable:
     return steady.replace(notes=(*table.notes, *_alias_notes(words)))
 
 
-def _numbered(table: Table, letter: str, unit: str) -> list[str]:
+def _numbered(table: FileTable, letter: str, unit: str) -> list[str]:
     """u1_V, u2_V, ... as far as the table has any; a gap in the numbers makes the rest unknown columns."""
     count = sum(bool(re.fullmatch(rf"{letter}[1-9]\d*_{unit}", name)) for name in table.names)
     return [f"{letter}{k + 1}_{unit}" for k in range(count)]
 
 
-def _per_wheel(table: Table, letter: str, unit: str) -> FloatArray | None:
+def _per_wheel(table: FileTable, letter: str, unit: str) -> FloatArray | None:
     names = _numbered(table, letter, unit)
     return np.stack([table.measured(name, missing=True) for name in names], axis=1) if names else None
 
@@ -178,7 +178,7 @@ def _alias_notes(words: Sequence[str]) -> list[str]:
     return [f"axis {word} was read as {ALIASES[word]}" for word in aliases]
 
 
-def _check_units(table: Table, words: Sequence[str]) -> None:
+def _check_units(table: FileTable, words: Sequence[str]) -> None:
     """A row of units must say what is expected for the axes in the table."""
     axes = {ALIASES.get(word.lower(), word.lower()) for word in words} & set(AXES)
     for name, unit in table.units.items():

@@ -10,7 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from omnidyn.document import Points, Table
+from omnidyn.document import Points, Table, in_clauses
 from omnidyn.errors import printable
 from omnidyn.report.style import Picture
 
@@ -66,7 +66,9 @@ def page(
     """
     all_sections = [*sections, Section("made", "How this was made", provenance_table(provenance))]
     links = "".join(f'<a href="#{escaped(part.key)}">{escaped(part.title)}</a>' for part in all_sections)
-    first = f"<p><strong>{escaped(verdict)}</strong></p>" if verdict else ""
+    line, clauses = in_clauses(verdict)
+    first = f"<p><strong>{escaped(line)}</strong></p>" if verdict else ""
+    first += f"<ul>{''.join(f'<li>{escaped(clause)}</li>' for clause in clauses)}</ul>" if clauses else ""
     words = f"<p>{escaped(introduction)}</p>" if introduction else ""
     head = f"<header><h1>{escaped(title)}</h1>{first}{screen}{words}{lead}<nav>{links}</nav></header>"
     parts = (

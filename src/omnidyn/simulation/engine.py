@@ -19,13 +19,13 @@ from omnidyn.model.stick_slip.release import start_state
 from omnidyn.simulation.commands import Commands, as_floats, current_bounds, loop_gains, on_ticks
 from omnidyn.simulation.contract import Conditions, Engine, Motion
 from omnidyn.simulation.coulomb.door import moved, run, run_looped
+from omnidyn.simulation.exact.exact_march import ExactMarch, why_not_exact
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
-from omnidyn.simulation.exact.march import ExactMarch, why_not_exact
-from omnidyn.simulation.implicit.march import Outcome, capped, march_workspace, run_implicit
-from omnidyn.simulation.slip.march import SlipOutcome, rolling, run_slipping
+from omnidyn.simulation.implicit.implicit_march import Outcome, capped, march_workspace, run_implicit
 from omnidyn.simulation.slip.plant import slip_plant, wheel_loads
-from omnidyn.simulation.speed_loop import LoopCommands, loop_of, no_loop
-from omnidyn.simulation.way import PATH
+from omnidyn.simulation.slip.slip_march import SlipOutcome, rolling, run_slipping
+from omnidyn.simulation.speed_loop import LoopSettings, loop_of, no_loop
+from omnidyn.simulation.travel import PATH
 from omnidyn.statement import WARNING, Statement
 
 TOLERANCE = 1e-6
@@ -124,7 +124,7 @@ class _SolverRows(NamedTuple):
     dt: FloatArray
     voltage: FloatArray
     bound: FloatArray
-    loop: LoopCommands
+    loop: LoopSettings
     first: Any = slice(None)
     keep: Any = slice(None)
 

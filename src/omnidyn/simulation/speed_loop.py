@@ -20,7 +20,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.simulation.commands import loop_gains
 
 
-class LoopCommands(NamedTuple):
+class LoopSettings(NamedTuple):
     """Gains and set points of a speed loop; without commands the voltages are given."""
 
     kp: FloatArray  # (n,) [V s/rad]
@@ -34,18 +34,18 @@ class LoopCommands(NamedTuple):
     dead: float  # [V] of what the loop asks for the driver passes on all but this
 
 
-def no_loop(wheels: int) -> LoopCommands:
+def no_loop(wheels: int) -> LoopSettings:
     """No speed loop: voltages are given."""
     zeros = np.zeros(wheels)
-    return LoopCommands(
+    return LoopSettings(
         zeros, zeros, zeros, zeros, np.zeros((0, wheels)), np.zeros(0, np.bool_), 0.0, zeros.copy(), 0.0
     )
 
 
-def loop_of(robot: Robot, set_point: FloatArray, tick: BoolArray) -> LoopCommands:
+def loop_of(robot: Robot, set_point: FloatArray, tick: BoolArray) -> LoopSettings:
     """The loop of a robot at rest. set_point [rad/s], shape (rows, n), and tick, shape (rows,): see `on_ticks`."""
     period, total = 1.0 / (robot.drive.rate or np.inf), np.zeros(robot.wheels.count)
-    return LoopCommands(*loop_gains(robot), set_point, tick, period, total, robot.drive.dead_band)
+    return LoopSettings(*loop_gains(robot), set_point, tick, period, total, robot.drive.dead_band)
 
 
 @part

@@ -169,7 +169,7 @@ SENTENCES = {
     "pays_less": Sentence("pays less"),
     "not_distinguishable": Sentence("not distinguishable with these logs"),
     "as_good_not_simpler": Sentence("as good within a standard error, not simpler"),
-    "predicts_no_better": Sentence("predicts held-out blocks no better"),
+    "predicts_no_better": Sentence("predicts held-out blocks no better than by chance ({better} of {blocks} better)"),
     "costs_more_than_it_explains": Sentence("explains less than its numbers cost"),
     "other_explains_more": Sentence("{cause} would explain more"),
     "step_does_not_follow": Sentence("does not follow the logs"),

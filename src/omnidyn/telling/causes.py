@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from omnidyn.document import all_of, short
+from omnidyn.document import all_of, both, short
 from omnidyn.identification.steady.lack_of_fit import TURNED_DEG
 from omnidyn.model.keys import BODY_AXES, DIRECTION, find_key, in_words, unit
 from omnidyn.statement import Statement
@@ -37,12 +37,11 @@ def named(key: str) -> str:
 def changes(statement: Statement) -> str:
     """ "viscous friction forward 0.5 -> 0.3 N s/m": the numbers that a cause would change, as many as are given."""
     names, before, after = (statement.numbers[name] for name in ("changed", "before", "after"))
-    return all_of(
-        [
-            f"{in_words(name)} {now:.3g} -> {then if abs(then) > NO_REST * abs(now) else 0.0:.3g} {unit(name)}".rstrip()
-            for name, now, then in zip(names, before, after, strict=True)
-        ]
-    )
+    words = []
+    for name, now, then in zip(names, before, after, strict=True):
+        if ends := both(now, then if abs(then) > NO_REST * abs(now) else 0.0):
+            words.append(f"{in_words(name)} {ends[0]} -> {ends[1]} {unit(name)}".rstrip())
+    return all_of(words)
 
 
 def _named(statement: Statement) -> str:
@@ -80,7 +79,8 @@ def _changes(statement: Statement) -> str:
     at = "" if numbers["at"] is None else f", at {short(numbers['at'], '.3g')} s"
     when = f"{100.0 * numbers['share']:.0f} % into the log{at}"
     if statement.subject == "mass":
-        about = f" from {numbers['before']:.3g} to about {numbers['after']:.2g} kg"
+        ends = both(numbers["before"], numbers["after"])
+        about = f" from {ends[0]} to about {ends[1]} kg" if ends else ""
     else:
         about = f" by about {short(100.0 * numbers['by'], '+.2g')} %" if statement.subject == "supply" else ""
     return f"{statement.subject} that changes{about} {when}"

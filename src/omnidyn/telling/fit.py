@@ -53,7 +53,8 @@ def _size_fitted(statement: Statement) -> str:
     return (
         f"a latency of {1e3 * numbers['latency']:.3g} ms stood in for {all_of([*map(in_words, numbers['keys'])])}: "
         f"with them fitted too a free run misses {100.0 * numbers['with']:.3g} % of the spread of the outputs on "
-        f"held-out blocks of the log, {100.0 * numbers['error']:.3g} % without; they are not those of the robot file"
+        f"held-out blocks of the log, {100.0 * numbers['error']:.3g} % without ({numbers['better']} of "
+        f"{numbers['blocks']} blocks are predicted better); they are not those of the robot file"
     )
 
 
@@ -256,32 +257,46 @@ SENTENCES = {
     ),
     "latency_like_zero": Sentence("these logs do not tell {latencies} from 0: the robot file has none of it"),
     "harmful_nuisance": Sentence(
-        "{subject} improves the likelihood but worsens the prediction of held-out blocks of the log: it is not fitted"
+        "{subject} improves the likelihood but worsens the prediction of held-out blocks of the log ({better} of "
+        "{blocks} are predicted better without it, {gain:%.2g} % less squared error on average): it is not fitted"
     ),
     "late_by_rows": Sentence(
-        "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows of the log: a camera, a network or a filter may be as "
-        "late; a drive is not, and then an inertia or something else that the model misses stands behind it"
+        either(
+            "without",
+            "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows of the log (a free run misses {error:%.3g} % of "
+            "the spread of held-out outputs, {without:%.3g} % by the best fit without it): a camera, a network or a "
+            "filter may be as late; a drive is not, and then something that the model misses stands behind it",
+            "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows of the log: a camera, a network or a filter may "
+            "be as late; a drive is not, and then an inertia or something else that the model misses stands behind it",
+        )
     ),
     "size_fitted": Sentence(_size_fitted, "measure {keys}, and write them into the robot file"),
     "constant_force": Sentence(
         "a constant force pushes the robot ({keys}): with it a free run misses {with:%.3g} % of the spread of the "
-        "outputs on held-out blocks of the log, {error:%.3g} % without",
+        "outputs on held-out blocks of the log, {error:%.3g} % without ({better} of {blocks} blocks are "
+        "predicted better)",
         "look for a floor that is not level, a cable, a brush, or voltages that are off by a constant; friction that "
         "is not the same both ways looks alike",
     ),
     "plain_predicts_better": Sentence(
-        "the fit without {nuisances} predicts held-out blocks of the log better (a free run misses {plain:%.3g} % of "
-        "the spread of the outputs, {error:%.3g} % with them): they are not fitted"
+        "the fit without {nuisances} predicts {better} of {blocks} held-out blocks of the log better (a free run "
+        "misses {plain:%.3g} % of the spread of the outputs, {error:%.3g} % with them): they are not fitted"
     ),
     "white_predicts_better": Sentence(
-        "a fit that takes the errors to remember predicts held-out blocks of the log worse (a free run misses "
-        "{error:%.3g} % of the spread of the outputs, {white:%.3g} % by least squares): least squares are taken, and "
-        "the model misses something"
+        "a fit that takes the errors to remember predicts {better} of {blocks} held-out blocks of the log worse (a "
+        "free run misses {error:%.3g} % of the spread of the outputs, {white:%.3g} % by least squares): least squares "
+        "are taken, and the model misses something"
     ),
     "given_predicts_better": Sentence(
-        "the robot as it was given predicts held-out blocks of the log better than the fitted one (a free run misses "
-        "{given:%.3g} % of the spread of the outputs, {error:%.3g} % after the fit): it is what is written",
+        "the robot as it was given predicts {better} of {blocks} held-out blocks of the log better than the fitted one "
+        "(a free run misses {given:%.3g} % of the spread of the outputs, {error:%.3g} % after the fit): it is written",
         "record a longer log, or look for what the model misses",
+    ),
+    "given_predicts_tail_better": Sentence(
+        "the robot as it was given predicts the last 40 % of the log better than a fit to what comes before "
+        "({better} of {blocks} blocks, {gain:%.2g} % less squared error): for what comes after this log it may be "
+        "the better one",
+        "keep the robot as given, or record a longer log: errors that last as long as this one look like friction",
     ),
     "held_out_blocks": Sentence(
         either(

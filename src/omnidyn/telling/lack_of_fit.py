@@ -162,6 +162,10 @@ SENTENCES = {
     "only_noise": Sentence("the residuals hold nothing but noise, as far as these logs tell"),
     "unrelated_residuals": Sentence("the residuals follow nothing that a model should know, as far as these logs tell"),
     "misfit_unexplained": Sentence(_unexplained),
+    "misfit_small": Sentence(
+        "a free run misses {missed:%.2g} % of the spread on held-out rows; more than noise is in the residual of "
+        "{subject}, and no known cause explains it"
+    ),
     "misfit_without_law": Sentence(_unoffered),
     "misfit_with_rivals": Sentence(_rivals),
     "misfit_nearest_cause": Sentence(_weak),

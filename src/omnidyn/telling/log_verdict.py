@@ -128,7 +128,8 @@ def of_several(verdicts: Mapping[str, Verdict | None], width: int, full: bool = 
     groups = _groups(read)
     blocks = [[*_paragraphs(group[0][1], _where([labels[path] for path, _ in group]))] for group in groups]
     verdict = overall(verdicts)
-    lines = 10**9 if full else LINES_OF_SEVERAL - 1 - _height([Words(verdict), *parts], width)
+    taken = len(Document((), verdict=verdict).verdict_lines(width)) + _height(parts, width)
+    lines = 10**9 if full else LINES_OF_SEVERAL - 1 - taken
     parts += _shown(blocks, [found[0][1] for found in groups], lines, width)
     return Document(parts, ascii=True, verdict=verdict)
 

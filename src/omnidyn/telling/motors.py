@@ -109,6 +109,12 @@ def _dead_band_seen(statement: Statement) -> str:
     return f"dead band{offset} {_band(statement)}"
 
 
+def _dead_band_hardly_known(statement: Statement) -> str:
+    """Held-out blocks need a dead band, and its interval reaches 0, or that of the slope does."""
+    words = f"dead band {_band(statement)}: held-out rows are predicted better with one"
+    return f"{words}, but it and the slope are hardly known apart; hold more inputs"
+
+
 def _dead_band_negative(statement: Statement) -> str:
     """The line of a motor meets speed 0 below 0."""
     return (
@@ -161,11 +167,11 @@ def _dead_bands_apart(statement: Statement) -> str:
 def _start_not_seen(statement: Statement) -> str:
     """No start from rest was seen; where the line meets speed 0, if that is known."""
     numbers = statement.numbers
-    line = NOT_IDENTIFIABLE
-    if numbers["offset_known"]:
-        ends = "[{:.3g}, {:.3g}]".format(*numbers["offset_ci95"])
-        line = f"its line meets speed 0 at {numbers['offset']:.3g} {numbers['unit']}, 95 % {ends}"
-    return f"{statement.subject}: no start from rest was seen; {line}"
+    words = f"{statement.subject}: no start from rest was seen"
+    if not numbers["offset_known"]:
+        return words
+    ends = "[{:.3g}, {:.3g}]".format(*numbers["offset_ci95"])
+    return f"{words}; its line meets speed 0 at {numbers['offset']:.3g} {numbers['unit']}, 95 % {ends}"
 
 
 def _start_seen(statement: Statement) -> str:
@@ -251,12 +257,14 @@ SENTENCES = {
     "line_meets_zero": Sentence(_line_meets_zero),
     "dead_band_bounded": Sentence(_dead_band_bounded),
     "dead_band_seen": Sentence(_dead_band_seen),
+    "dead_band_of_starts": Sentence("its line tells no dead band, its starts do"),
+    "dead_band_hardly_known": Sentence(_dead_band_hardly_known),
     "dead_band_negative": Sentence(_dead_band_negative),
     "slope_may_be_zero": Sentence(_slope_may_be_zero),
     "dead_band_not_needed": Sentence(_dead_band_not_needed),
     "held_out_no_better": Sentence(
-        "{subject}: held-out logs are predicted no better with its dead band (error {written:.4g} {travel}/s, "
-        "{plain:.4g} by slope and lag alone): it may be an effect of something else"
+        "{subject}: held-out logs are predicted no better with its dead band ({better} of {blocks} blocks are; error "
+        "{written:.4g} {travel}/s, {plain:.4g} by slope and lag alone): it may be an effect of something else"
     ),
     "motor_held_out_blocks": Sentence(_held_out_blocks),
     "dead_band_rejected": Sentence(
@@ -264,7 +272,7 @@ SENTENCES = {
             "blocks",
             "no dead band is kept: {better} of {blocks} held-out blocks are predicted better with one, no more than by "
             "chance; it is at most {high:.3g} {unit}",
-            "no dead band is kept: held-out blocks are predicted as well without; it is at most {high:.3g} {unit}",
+            "no dead band is kept: these logs do not tell it from 0; it is at most {high:.3g} {unit}",
         )
     ),
     "offset_as_friction": Sentence(_offset_as_friction),
@@ -294,6 +302,11 @@ SENTENCES = {
     "start_seen": Sentence(_start_seen),
     "starts_scatter": Sentence("its {subject}s scatter by more than their intervals: the interval spans them"),
     "no_motor_answers": Sentence("no motor is seen to answer to its input: the speed of {motors} does not go with it"),
+    "answers_by_free_run": Sentence(
+        "its free run predicts held-out rows, but block by block its speed is not seen to go with its input: step the "
+        "input more often"
+    ),
+    "dead_bands_hardly_known": Sentence("the dead band of {motors} is hardly known"),
     "motors_answer": Sentence(_motors_answer),
     "starts_both_ways": Sentence(_starts_both_ways),
     "motors_start": Sentence(_motors_start),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-from omnidyn.document import all_of
-from omnidyn.identification.steady.choice import NOT_COMPARED, SHAPE_ERRORS
+from omnidyn.document import all_of, both
+from omnidyn.identification.selection.blocks import LIMIT_ERRORS
+from omnidyn.identification.steady.choice import NOT_COMPARED
 from omnidyn.identification.steady.operating_points import ANGLE, FORCES, SPEEDS
 from omnidyn.identification.steady.shapes import SHAPES
 from omnidyn.model.keys import Key, unit
@@ -182,9 +183,10 @@ def _changes_within_run(statement: Statement) -> str:
 def _change_in_run(statement: Statement) -> str:
     """A change inside a run, in a few words."""
     numbers = statement.numbers
-    return "{:+.3g} %, from {:.3g} to {:.3g} N, in {} at {:.4g} s".format(
-        100.0 * numbers["change"], numbers["before"], numbers["after"], statement.subject or "the run", numbers["at"]
-    )
+    ends = both(numbers["before"], numbers["after"])
+    levels = f", from {ends[0]} to {ends[1]} N" if ends else ""
+    where = statement.subject or "the run"
+    return f"{100.0 * numbers['change']:+.3g} %{levels}, in {where} at {numbers['at']:.4g} s"
 
 
 def _against_motion(statement: Statement) -> str:
@@ -225,7 +227,7 @@ def _rests_on_back_emf(statement: Statement) -> str:
 
 def _more_directions(statement: Statement) -> str:
     """How many more runs would tell two shapes apart."""
-    factor = (SHAPE_ERRORS / statement.numbers["apart"]) ** 2
+    factor = (LIMIT_ERRORS / statement.numbers["apart"]) ** 2
     amount = (
         f"about {math.ceil(factor)} times as many runs" if factor < PRACTICAL else "far more runs than is practical"
     )

@@ -23,7 +23,7 @@ def _numbers_known(statement: Statement) -> str:
     if count == 1:
         return f"{in_words(widest)} is known {within}"
     words = f"{known} {count} numbers are known, the widest ({in_words(widest)}) {within}"
-    return f"{words}; not {names_of(missing)}" if missing else words
+    return f"{words}; not known: {names_of(missing)}" if missing else words
 
 
 def _predicted(held_out: Statement | None) -> str:
@@ -94,6 +94,13 @@ def _steady(statement: Statement) -> str:
     )
 
 
+def _force_changes(statement: Statement) -> str:
+    """The force changes inside runs."""
+    first, *others = map(str, statement.numbers["changes"])
+    more = "".join(f"; also {change}" for change in others)
+    return f"the force of friction changes within a run ({first}): the levels lie between both{more}"
+
+
 def _shapes(statement: Statement) -> str:
     """Shapes of friction, each with its group."""
     pairs = zip(statement.numbers["names"], statement.numbers["groups"], strict=True)
@@ -118,9 +125,7 @@ SENTENCES = {
     "log_not_usable": Sentence(_not_usable),
     "logs_with_errors": Sentence(_logs_with_errors),
     "not_made": Sentence("not made: {parts} ({reason})"),
-    "force_changes_in_run": Sentence(
-        "the force of friction changes within a run ({changes}): the levels lie between both"
-    ),
+    "force_changes_in_run": Sentence(_force_changes),
     "forces_unexplained": Sentence(
         "no shape of friction explains the forces: the best, {subject}, misses {error:.2g} N of {size:.2g} N in a "
         "direction that was left out"

@@ -6,6 +6,7 @@ import pytest
 from omnidyn.findings.check import check
 from omnidyn.logs.column import Column
 from omnidyn.logs.columns.mapping import ColumnMap
+from omnidyn.logs.read_log import load_log
 from omnidyn.logs.log import Log
 from omnidyn.simulation.simulate import simulate
 
@@ -118,3 +119,17 @@ def test_what_was_exchanged_with_the_dead_encoder_starts_no_tale(log, robot, wit
     speed[:, 1] = speed[:, 0]
     speed[:, 0] = 0.0
     assert grave(check(with_channels(wheel_speed=speed), robot)) == {"dead"}
+
+
+@pytest.mark.parametrize("name, code", [("i1_A", -999.0), ("w1_rad_s", 65535.0), ("supply_V", 9999.0), ("x_m", -9999.0)])
+def test_a_code_in_some_rows_asks_for_no_other_unit(tmp_path, name, code):
+    """From the file on: it is the channel that is named, not its unit, however many rows hold the code."""
+    t, draw = np.arange(600) / 100.0, np.random.default_rng(0)
+    values = 3.0 * np.sin(t) + 0.01 * draw.normal(size=600) + (12.0 if name == "supply_V" else 0.0)
+    values[7::37] = code
+    table = np.column_stack([t, 5.0 * np.sin(t), values])
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=f"t_s,u1_V,{name}", comments="")
+    verdict = check(load_log(tmp_path / "log.csv"))
+    assert not verdict.of("not_taken")
+    (finding,) = verdict.of("placeholder")
+    assert finding.numbers["cell"] == code

@@ -14,7 +14,7 @@ from omnidyn.model.motor import Motor
 from omnidyn.model.robot import Body, Prior, Robot
 from omnidyn.model.wheels import Wheels
 from omnidyn.run import Run
-from omnidyn.simulation.exact.march import why_not_exact
+from omnidyn.simulation.exact.exact_march import why_not_exact
 from tests.reference.modes import plant_of
 from tests.reference.modes_stepper import stepped
 

@@ -8,7 +8,7 @@ from omnidyn.errors import UnsupportedError
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, SlipEngine
-from omnidyn.identification.output_error.linear.motion import motions
+from omnidyn.identification.output_error.linear.driven_motion import motions
 from omnidyn.identification.output_error.prepare import FINE_TOLERANCE, make_problem, motion, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.structure.missing import laws

@@ -7,7 +7,7 @@ import omnidyn
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.prepare import guesses
 from omnidyn.identification.output_error.problem.parameters import Parameter
-from omnidyn.identification.output_error.problem.problem import Fitted
+from omnidyn.identification.output_error.problem.problem import FitProblem
 from omnidyn.identification.output_error.solve.steps import Order
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key
@@ -118,7 +118,7 @@ def test_what_is_guessed_is_free_by_itself(truth):
     assert abs(fit.value[HELD] - 2.8) <= 3.0 * fit.std[HELD]
 
 
-class Some(Fitted):
+class Some(FitProblem):
     def __init__(self, *names):
         self.parameters, self.pieces = tuple(Parameter(name, 1.0, 0.0, 10.0) for name in names), ()
 
@@ -144,7 +144,7 @@ def test_without_a_fall_there_is_no_stribeck_speed(seed):
     assert fit.ci95[KEYS[1]][0] <= low <= 2.2 <= high <= 2.7
     assert fit.value[HELD] >= fit.value[KEYS[1]]
     assert KEYS[3] in fit.unidentifiable  # how fast nothing falls
-    assert "not Stribeck speed" in fit.verdict
+    assert "not known: Stribeck speed" in fit.verdict
     assert "no_fall" in codes(fit.warnings)
 
 

@@ -12,7 +12,7 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.output_error.linear.motion import motions
+from omnidyn.identification.output_error.linear.driven_motion import motions
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.structure.missing import refits
 from omnidyn.identification.structure.missing.candidates import CHANGE, unoffered

@@ -10,11 +10,11 @@ from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error import fit
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear import blocks as held_out
-from omnidyn.identification.output_error.linear.blocks import Blocks, _harm, _without, rejected_nuisances
+from omnidyn.identification.output_error.linear.blocks import BlockProducts, _without, _without_it, rejected_nuisances
+from omnidyn.identification.selection.blocks import compare_blocks
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy_draw
-from tests.support.codes import codes
 
 VOLTS = excitation(60.0, 100.0)
 PART = slice(1500, 1900)
@@ -27,7 +27,7 @@ def robot():
 
 def solved(log, robot):
     """The fit with all that is automatic, and supported by the likelihood."""
-    with patch.object(fit, "rejected_nuisances", lambda solution: ()):
+    with patch.object(fit, "rejected_nuisances", lambda solution: {}):
         return Fit.of([log], robot, OutputError()).solve()
 
 
@@ -46,7 +46,10 @@ def test_what_soaks_up_a_part_of_the_log_is_not_fitted(robot):
     assert set(rejected_nuisances(found)) == {"latency.twist", "dead_band"} == set(found.solver.problem.names[6:])
     estimate = identify(log, robot, OutputError()).estimate
     assert not estimate.nuisances
-    assert codes(estimate.warnings).count("harmful_nuisance") == 2
+    harmful = [each for each in estimate.warnings if each.code == "harmful_nuisance"]
+    assert len(harmful) == 2
+    assert all(each.numbers["blocks"] == 10 and each.numbers["gain"] > 0.0 for each in harmful)
+    assert "of 10 are predicted better without it" in str(harmful[0])
 
 
 @pytest.mark.parametrize("late", [1, 3])
@@ -54,12 +57,12 @@ def test_a_latency_that_is_there_stays(robot, late):
     log = noisy_draw(simulate(robot, VOLTS, 0.01), late)
     twist = log.twist.copy()
     twist[late:] = twist[:-late]
-    assert rejected_nuisances(solved(log.replace(twist=twist), robot)) == ()
+    assert rejected_nuisances(solved(log.replace(twist=twist), robot)) == {}
 
 
 def test_nothing_is_looked_at_where_the_likelihood_is_sure_of_none(robot, monkeypatch):
     monkeypatch.setattr(held_out, "_blocks", None)
-    assert rejected_nuisances(solved(noisy_draw(simulate(robot, VOLTS, 0.01), 0), robot)) == ()
+    assert rejected_nuisances(solved(noisy_draw(simulate(robot, VOLTS, 0.01), 0), robot)) == {}
 
 
 def test_a_nuisance_that_was_asked_for_is_fitted_whatever_it_does(robot):
@@ -73,7 +76,7 @@ def test_the_error_of_blocks_is_that_of_fits_to_all_others():
     columns, residual = rng.standard_normal((count, 4)), rng.standard_normal(count)
     parts = np.split(np.arange(count), 10)
     every = np.column_stack([residual, columns])
-    blocks = object.__new__(Blocks)
+    blocks = object.__new__(BlockProducts)
     blocks.size = np.concatenate([[1.0], np.linalg.norm(columns, axis=0)])
     every = every / blocks.size
     blocks.matrix, blocks.total = np.array([every[own].T @ every[own] for own in parts]), every.T @ every
@@ -87,5 +90,6 @@ def test_the_error_of_blocks_is_that_of_fits_to_all_others():
     with_ = np.array([error([0, 1, 2, 3], residual, own) for own in parts])
     without = np.array([error([0, 1, 3], residual - step * columns[:, 2], own) for own in parts])
     assert _without(blocks, 2, step).held_out(at[at != 3]) == pytest.approx(without, rel=1e-9)
-    change = with_ - without
-    assert _harm(blocks, at, 2, step) == pytest.approx(change.sum() / (change.std(ddof=1) * 10**0.5), rel=1e-9)
+    comparison = _without_it(blocks, at, 2, step)
+    assert (comparison.better, comparison.blocks) == ((without < with_).sum(), 10)
+    assert comparison.p == pytest.approx(compare_blocks(with_, without).p, rel=1e-9)

@@ -193,7 +193,8 @@ def test_more_numbers_must_pay_for_themselves():
     assert more.bic() - fewer.bic() == pytest.approx(np.log(100.0))
     assert more.bic(20) - more.bic() == pytest.approx(2.0 * np.log(20.0))
     better = replace(more, held_out=np.full(10, 9.0))
-    assert better.gain(fewer) == pytest.approx((0.1, 0.0))
+    comparison = better.beside(fewer)
+    assert (comparison.better, comparison.gain) == (10, pytest.approx(0.1))
     assert fewer.size == pytest.approx(1.0)
 
 

@@ -9,7 +9,7 @@ from benchmarks.wrong_worlds.log import AR, SPEEDS, TICKS, logged, right_case, r
 from benchmarks.wrong_worlds.score import drawn
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.linear.motion import motions
+from omnidyn.identification.output_error.linear.driven_motion import motions
 from omnidyn.identification.output_error.linear.sensitivity import losses, shown_by_losses
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.model.wheels import wheel_speed

@@ -10,7 +10,7 @@ from omnidyn.identification.lack_of_fit import LOSS
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.output_error.linear.rows import Rows
+from omnidyn.identification.output_error.linear.rows import FitRows
 from omnidyn.identification.structure.tails import as_counted, sprinkled
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -94,7 +94,7 @@ def test_pulled_in_residuals_leave_a_robust_fit_where_it_is():
     parts = ExactEngine(problem).residuals(point)
     far = []
     for own in (as_counted(solution, problem, parts), parts):
-        rows = Rows.of(problem, point, own)
+        rows = FitRows.of(problem, point, own)
         weighed = rows.slopes[0] / variance[:, None, None]
         size = np.sqrt(np.einsum("ckp,ckp->p", weighed, rows.slopes[0]))
         far.append(np.abs(np.einsum("ck,ckp->p", rows.residual[0], weighed) / size).max())

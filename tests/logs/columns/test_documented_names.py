@@ -10,7 +10,7 @@ from omnidyn.logs.columns.guess import guess_columns
 from omnidyn.logs.columns.mapping import quantity_of
 from omnidyn.logs.read_log import read_log
 from omnidyn.logs.readers.read_table import read_table
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.units import DUTY, parse_unit
 
 PAGE = (Path(__file__).parents[3] / "docs" / "logs.md").read_text("utf-8")
@@ -26,7 +26,7 @@ UNITS = [word for text in re.findall(r"`([^`]*)`", LISTED) for word in text.spli
 
 def taken(columns, units=None):
     cells = {"t_s": T, "vx": SWING, **columns}  # a body, so that omega is its own
-    table = Table(tuple(cells), cells, np.arange(ROWS) + 2, units or {}, "log.csv", "", ())
+    table = FileTable(tuple(cells), cells, np.arange(ROWS) + 2, units or {}, "log.csv", "", ())
     return guess_columns(table)
 
 

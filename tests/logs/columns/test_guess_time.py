@@ -8,7 +8,7 @@ import pytest
 from omnidyn.cli import main
 from omnidyn.logs.columns.guess import guess_columns
 from omnidyn.logs.read_log import load_log
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from tests.logs.columns.test_guess import ROWS, clock, table_of
 from tests.support.codes import said
 
@@ -104,7 +104,7 @@ SIZES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 def unit_found(times, size, **columns):
     """The unit of times [s] that are written as so many of `size`; None where it is asked."""
     cells = {"time": times / size, **columns}
-    table = Table(tuple(cells), cells, np.arange(len(times)) + 2, {}, "log.csv", "", ())
+    table = FileTable(tuple(cells), cells, np.arange(len(times)) + 2, {}, "log.csv", "", ())
     guessed = guess_columns(table)
     assert ("t" in guessed.columns) != any("t" in open_doubt.components for open_doubt in guessed.doubts)
     return guessed.columns["t"].unit if "t" in guessed.columns else None

@@ -6,7 +6,7 @@ import pytest
 from omnidyn import load_robot
 from omnidyn.logs.columns.guess import guess_columns
 from omnidyn.logs.columns.names import read_name
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.wheels import Wheels
 from tests.support.codes import said
@@ -16,7 +16,7 @@ FL, FR, RL, RR = 45.0, -45.0, 135.0, -135.0
 
 def table(*names):
     columns = {"t_s": np.arange(5) * 0.01} | {name: np.sin(np.arange(5.0) + k) for k, name in enumerate(names)}
-    return Table(tuple(columns), columns, np.arange(5), {}, "log.csv", "")
+    return FileTable(tuple(columns), columns, np.arange(5), {}, "log.csv", "")
 
 
 def mapped(*names, robot=None):

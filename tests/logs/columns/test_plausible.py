@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import omnidyn
 from omnidyn.logs.columns.guess import guess_columns
 from omnidyn.logs.log import Log
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.model.robot_file import load_robot
 from tests.support.bags import BagMaker, write_mcap
 from tests.support.codes import said
@@ -21,7 +21,9 @@ ROWS = 60
 def guessed(columns, robot=None, assume=None):
     cells = {name: np.broadcast_to(np.asarray(values, dtype=float), ROWS) for name, values in columns.items()}
     cells = {"t_s": 0.01 * np.arange(ROWS), **cells}
-    return guess_columns(Table(tuple(cells), cells, np.arange(ROWS) + 2, {}, "log.csv", "", ()), robot, assume or {})
+    return guess_columns(
+        FileTable(tuple(cells), cells, np.arange(ROWS) + 2, {}, "log.csv", "", ()), robot, assume or {}
+    )
 
 
 SWING = np.sin(0.4 * np.arange(ROWS))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.steady.steady_state import fit_steady_state
-from omnidyn.logs.command_file import read_voltages
+from omnidyn.logs.command_file import read_commands
 from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.run_file import read_run
 from omnidyn.logs.steady_table import read_steady_table
@@ -154,10 +154,10 @@ def test_read_any_of_parquet(path, parquet_seed, edits, cut):
 
 @settings(max_examples=400, deadline=None)
 @given(content=files(VOLTAGE), duration=st.none() | st.floats(1e-3, 1e3))
-def test_read_voltages(path, content, duration):
+def test_read_commands(path, content, duration):
     path.write_bytes(content)
     try:
-        held = read_voltages(path, 3, duration)
+        held = read_commands(path, 3, duration)
     except OmnidynError:
         return
     assert held.voltage.shape == (len(held.dt), 3)

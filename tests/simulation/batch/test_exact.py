@@ -7,7 +7,7 @@ from omnidyn.compiled.kernel import kernel, plain
 from omnidyn.model.dynamics import state_space
 from omnidyn.simulation.batch.exact import advance, exact_law, put_drive, put_shared_drive
 from omnidyn.simulation.batch.parameters import WIDTH, batch_parameters, in_blocks, out_of_blocks
-from omnidyn.simulation.exact.march import axis_levels
+from omnidyn.simulation.exact.exact_march import axis_levels
 from omnidyn.simulation.exact.step import exact_step
 from tests.support.exported import exact_robot
 

@@ -7,8 +7,8 @@ import pytest
 
 import omnidyn
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
-from omnidyn.simulation.batch.choice import BOX, GENERAL, engine_kind
-from omnidyn.simulation.batch.choice import DIRECTION as ALONG
+from omnidyn.simulation.batch.engine_kind import BOX, GENERAL, engine_kind
+from omnidyn.simulation.batch.engine_kind import DIRECTION as ALONG
 from tests.support.exported import exact_robot
 
 DT, ROWS, ROBOTS = 0.004, 200, 1000

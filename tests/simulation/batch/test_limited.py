@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.simulation.batch.choice import LIMITED, engine_kind
+from omnidyn.simulation.batch.engine_kind import LIMITED, engine_kind
 from tests.simulation.batch.test_implicit import turning_robot
 from tests.simulation.batch.test_latency import ROBOTS
 

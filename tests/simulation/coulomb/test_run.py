@@ -16,7 +16,7 @@ from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.sensitivity.directions import EPS, prepared
 from omnidyn.simulation.sensitivity.late_sample import Direction, VoltageProgram, late_samples
 from omnidyn.simulation.simulate import simulate
-from omnidyn.simulation.way import PATH, PLACE
+from omnidyn.simulation.travel import PATH, PLACE
 from tests.reference.modes import reference
 from tests.support.friction_shapes import AXEBOT, implicit
 

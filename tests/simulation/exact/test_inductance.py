@@ -13,9 +13,9 @@ from scipy.integrate import solve_ivp
 from omnidyn.errors import InputError
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot import Robot
+from omnidyn.simulation.exact.exact_march import ExactMarch
 from omnidyn.simulation.exact.inductance import axis_laws, current_gain, simulate_exact_inductance
 from omnidyn.simulation.exact.inductance_step import AxisLaw, response
-from omnidyn.simulation.exact.march import ExactMarch
 from tests.support.robots import TABLE_3, random_program, random_robot, robot_of, with_breakaway
 
 INDUCTANCES = (1.1e-4, 2e-3, 2e-2)

@@ -12,7 +12,7 @@ from omnidyn.model.friction import AxesFriction, Friction, lugre
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import start_state
-from omnidyn.simulation.implicit.march import run_implicit
+from omnidyn.simulation.implicit.implicit_march import run_implicit
 from omnidyn.simulation.speed_loop import no_loop
 from tests.reference.modes_plant import plant_of
 

@@ -14,7 +14,7 @@ from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import start_state
 from omnidyn.run import Run
 from omnidyn.simulation.friction_study import friction_study
-from omnidyn.simulation.implicit.march import run_implicit
+from omnidyn.simulation.implicit.implicit_march import run_implicit
 from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.speed_loop import no_loop

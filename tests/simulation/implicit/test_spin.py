@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.mass import mass_matrix
-from omnidyn.simulation.exact.march import why_not_exact
+from omnidyn.simulation.exact.exact_march import why_not_exact
 from omnidyn.simulation.simulate import simulate
 from tests.reference.modes import plant_of, reference
 from tests.reference.modes_stepper import stepped

@@ -7,7 +7,7 @@ from omnidyn import load_robot, simulate
 from omnidyn.errors import InputError
 from omnidyn.model.layout import new_state
 from omnidyn.model.stick_slip.plant import plant
-from omnidyn.simulation.implicit import march as implicit
+from omnidyn.simulation.implicit import implicit_march as implicit
 from omnidyn.simulation.speed_loop import no_loop
 
 AXEBOT = load_robot("axebot")

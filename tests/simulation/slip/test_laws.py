@@ -11,8 +11,8 @@ from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.sensitivity.directions import EPS
 from omnidyn.simulation.sensitivity.late_sample import Direction, VoltageProgram
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
-from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import load_shift, slip_plant, wheel_loads
+from omnidyn.simulation.slip.slip_march import rolling, run_slipping
 from omnidyn.simulation.speed_loop import no_loop
 from tests.simulation.slip.test_random_robots import DT, drawn
 from tests.support.codes import codes

@@ -106,7 +106,7 @@ def _takes(kind: type[Method], name: str) -> bool:
 def _method(name: str, what: str, option_names: Sequence[str]) -> type[Method] | None:
     """The method by its name, or by options that one alone has; None where robot and logs say it."""
     kinds = MOTOR_METHODS if what == MOTORS else FRICTION_METHODS
-    takers = {word: [kind.name for kind in kinds if _takes(kind, word)] for word in option_names}
+    takers = {word: [kind.word for kind in kinds if _takes(kind, word)] for word in option_names}
     for word, methods in takers.items():
         if not methods and what == MOTORS:
             raise InputError("not an option of the motors", got=f"`{word}`", where=f"`what` {MOTORS}")
@@ -119,7 +119,7 @@ def _method(name: str, what: str, option_names: Sequence[str]) -> type[Method] |
     if steady and name == OUTPUT_ERROR:
         raise _refusal(OUTPUT_ERROR, steady[0], "for groups use `per`" if steady[0] == "group" else "leave it out")
     name = OUTPUT_ERROR if fit else STEADY_STATE if steady else name
-    return {kind.name: kind for kind in kinds}.get(name)
+    return {kind.word: kind for kind in kinds}.get(name)
 
 
 def _refusal(method: str, refused: str, remedy: str) -> InputError:

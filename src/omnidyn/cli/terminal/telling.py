@@ -69,8 +69,8 @@ def brief_document(
     statements = dict.fromkeys(warnings)
     grave = [warning for severity in (ERROR, WARNING) for warning in statements if warning.severity == severity]
     brief_table = replace(table, rows=table.rows[:BRIEF_ROWS])
-    title = Document((), verdict=verdict).verdict_text
-    room = BRIEF_LINES - SPARE_LINES - _height([Words(title), *head]) - len(brief_table.rows)
+    title = Document((), verdict=verdict).verdict_lines(WIDTH)
+    room = BRIEF_LINES - SPARE_LINES - len(title) - _height(head) - len(brief_table.rows)
     worst = [Words(f"{warning.severity}: {warning}", rest="  ") for warning in grave[:BRIEF_WARNINGS]]
     worst = _that_fit(worst, room - 2 * bool(advice))
     steps = _that_fit([Words(f"next: {step}", rest="  ") for step in advice[:BRIEF_STEPS]], room - _height(worst))

@@ -48,7 +48,7 @@ from omnidyn.control.controller import (
 )
 from omnidyn.control.feedforward import DT, check_dt, loop_motor
 from omnidyn.control.filtered_twist import FilteredTwist, filtered_twist
-from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Batch, Memory, MpcWorkspace, control_step, expect
+from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Memory, MpcBatch, MpcWorkspace, control_step, expect
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import PUSH, SCALE
 from omnidyn.control.mpc.settings import FILTERED, Preview, Settings
@@ -176,7 +176,7 @@ class Mpc:
         """What the observer found: "push" on each axis [m/s^2, m/s^2, rad/s^2], share of the modelled "friction"."""
         return {"push": self._memory.estimate[PUSH].copy(), "friction": self._memory.estimate[SCALE].copy()}
 
-    def batch(self, count: int) -> Batch:
+    def batch(self, count: int) -> MpcBatch:
         """As many controllers of the same robot as asked for, in one: `Batch.step_batch`. They begin anew.
 
         Raises InputError for a robot whose speeds are filtered.
@@ -188,7 +188,7 @@ class Mpc:
                 expected="[sensors] without twist_filter_s, or an Mpc for each robot",
                 where="batch",
             )
-        return Batch(
+        return MpcBatch(
             self._numbers,
             self._tables,
             self._room,

@@ -313,7 +313,7 @@ def control_batch(numbers, tables, previews, start, states, elapsed, memories, r
 # Many robots of one kind, one call a step: each with a state and a memory of its own
 
 
-class Batch:
+class MpcBatch:
     """The controllers of `count` robots; made by `Mpc.batch`. Gives volts, or commands of a speed loop."""
 
     def __init__(

@@ -66,7 +66,8 @@ class Settings:
 
     pose, volts, walk: None: POSE, VOLTS and WALK of the paper's robot; of another volts go with the square of what a
     volt speeds it up by, pose and the square of walk with the mass. pose_noise: None: what the sensors say of it, else
-    POSE_NOISE. push_walk: None: PUSH_WALK; behind a speed loop it goes with the rate at which that settles, MOST_WALK times as much at the most: the same share of a model that is wrong is a larger push there.
+    POSE_NOISE. push_walk: None: PUSH_WALK; behind a speed loop it goes with the rate at which that settles, MOST_WALK
+    times as much at the most: the same share of a model that is wrong is a larger push there.
     last: how much more the end of the horizon counts. again: how often at most a step is made linear anew.
     noise, pose_noise: std of the measured twist and pose that the observer expects [m/s, m/s, rad/s], [m, m, rad];
     noise: None: NOISE, `twist_noise` where that is more; where it is less, push_walk is larger by as much.

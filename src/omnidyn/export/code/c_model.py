@@ -18,7 +18,7 @@ from omnidyn.export.features import left_out, refuse
 from omnidyn.export.spelling import c_comment, filled
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.engine import TOLERANCE, as_tolerance
-from omnidyn.simulation.exact.march import why_not_exact
+from omnidyn.simulation.exact.exact_march import why_not_exact
 
 DOUBLE, SINGLE = "double", "single"
 NOTES = (

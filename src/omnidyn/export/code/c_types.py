@@ -45,7 +45,7 @@ class Many:
 
 
 @dataclass(frozen=True)
-class Record:
+class NumpyRecord:
     """A record of NumPy, of numbers and tables of numbers: a struct."""
 
     name: str
@@ -61,7 +61,7 @@ class Array:
     """A table of fixed shape, of numbers or of records."""
 
     shape: tuple[int, ...]
-    item: Scalar | Record = REAL
+    item: Scalar | NumpyRecord = REAL
 
     @property
     def row(self) -> Type:
@@ -89,7 +89,7 @@ class ColumnTypes:
     columns: tuple[Scalar, ...]
 
 
-Type = Scalar | Many | Array | Record | Struct | ColumnTypes
+Type = Scalar | Many | Array | NumpyRecord | Struct | ColumnTypes
 Typed = tuple[str, Type]
 
 
@@ -104,11 +104,11 @@ def joined(first: Type | None, second: Type) -> Type:
     raise TranslationError(f"a name holds {first} and {second}")
 
 
-def record_type(name: str, dtype: np.dtype) -> Record:
+def record_type(name: str, dtype: np.dtype) -> NumpyRecord:
     """The type of a NumPy record."""
     assert dtype.fields is not None
     shapes = {field: parts[0].shape for field, parts in dtype.fields.items()}
-    return Record(name, tuple((field, Array(shape) if shape else REAL) for field, shape in shapes.items()))
+    return NumpyRecord(name, tuple((field, Array(shape) if shape else REAL) for field, shape in shapes.items()))
 
 
 def table_type(value: Any) -> Array | ColumnTypes:

@@ -20,7 +20,7 @@ from omnidyn.export.code.c_types import (
     Array,
     ColumnTypes,
     Many,
-    Record,
+    NumpyRecord,
     Scalar,
     Struct,
     Type,
@@ -97,7 +97,7 @@ class Expressions:
                 return getattr(self._module(name), field)
             case ast.Attribute(value=record, attr=field):
                 kind = self.kind(record)
-                return self.program.known.get((kind.name, field)) if isinstance(kind, Record) else None
+                return self.program.known.get((kind.name, field)) if isinstance(kind, NumpyRecord) else None
             case ast.Subscript(value=table, slice=index):
                 values, place = self.known(table), self.known(index)
                 return None if values is None or place is None else float(values[place])
@@ -131,7 +131,7 @@ class Expressions:
                 return self.body.types.get(name)
             case ast.Attribute(value=value, attr=field):
                 kind = self.kind(value)
-                return kind.field(field) if isinstance(kind, Record | Struct) else None
+                return kind.field(field) if isinstance(kind, NumpyRecord | Struct) else None
             case ast.Subscript(value=value):
                 kind = self.kind(value)
                 return kind.row if isinstance(kind, Array) else None
@@ -171,7 +171,7 @@ class Expressions:
         if node.id in self.body.types:
             kind, name = self.body.types[node.id], c_name(node.id)
             self.body.read.add(node.id)
-            return (f"(*{name})" if isinstance(kind, Record) else name), kind
+            return (f"(*{name})" if isinstance(kind, NumpyRecord) else name), kind
         value = self._outer(node.id)
         if isinstance(value, int | float):
             return self.plain(value)
@@ -255,11 +255,11 @@ class Expressions:
                 raise TranslationError(f"{self.body.source.name}: {ast.unparse(node)} is not constant")
             return self.number(value), REAL
         text, kind = self.of(node.value)
-        if isinstance(kind, Record):
+        if isinstance(kind, NumpyRecord):
             self.program.use(kind, node.attr)
-        assert isinstance(kind, Struct | Record), ast.unparse(node)
+        assert isinstance(kind, Struct | NumpyRecord), ast.unparse(node)
         text, part = member(text, node.attr), kind.field(node.attr)
-        return (f"(*{text})" if isinstance(part, Record) else text), part  # a named tuple has the address of a record
+        return f"(*{text})" if isinstance(part, NumpyRecord) else text, part  # a named tuple has the address of one
 
     def _subscript(self, node: ast.Subscript) -> Typed:
         if (column := self._column(node)) is not None:
@@ -335,7 +335,7 @@ class Expressions:
         typed = [self.of(node) for node in nodes]
         kind = self.program.struct(cls, *(REAL if isinstance(item, Scalar) else item for _, item in typed))
         texts = [
-            address(text) if isinstance(item, Record) else self.real(node) if isinstance(item, Scalar) else text
+            address(text) if isinstance(item, NumpyRecord) else self.real(node) if isinstance(item, Scalar) else text
             for node, (text, item) in zip(nodes, typed, strict=True)
         ]
         return f"({kind.name}){{{', '.join(texts)}}}", kind
@@ -363,7 +363,7 @@ class Expressions:
         for position, node in enumerate(nodes):
             if position in function.writes:
                 self.body.writes_to(node)
-        texts = [address(text) if isinstance(kind, Record) else text for text, kind in arguments]
+        texts = [address(text) if isinstance(kind, NumpyRecord) else text for text, kind in arguments]
         return f"{function.name}({', '.join(texts)})", function.returns
 
     def _spread(self, node: ast.expr) -> list[ast.expr]:

@@ -34,9 +34,9 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import with_given_currents
 from omnidyn.model.stick_slip.step_bound import MONOTONE
-from omnidyn.simulation.implicit.march import Spare
+from omnidyn.simulation.implicit.implicit_march import Spare
 
-MARCH = "omnidyn.simulation.implicit.march"
+MARCH = "omnidyn.simulation.implicit.implicit_march"
 CHANGING = frozenset(("viscous", "coulomb", "turning"))  # of a bare plant, which solvers change
 MOST_STEPS = 300_000  # solved in one call to a tolerance
 MOST_PIECES = 100  # of a fixed step, which friction that falls with the speed cuts

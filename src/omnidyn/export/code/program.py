@@ -13,7 +13,7 @@ from omnidyn.export.code.c_types import (
     REAL,
     Array,
     Many,
-    Record,
+    NumpyRecord,
     Scalar,
     Struct,
     Type,
@@ -51,7 +51,7 @@ class CProgram:
     tables: dict[str, str] = field(default_factory=dict)
     functions: dict[tuple[Any, tuple[Type, ...]], Function] = field(default_factory=dict)
     texts: list[str] = field(default_factory=list)
-    used: dict[Record, set[str]] = field(default_factory=dict)
+    used: dict[NumpyRecord, set[str]] = field(default_factory=dict)
     _kinds: dict[str, Struct] = field(default_factory=dict)
     _names: set[str] = field(default_factory=set)
 
@@ -97,7 +97,7 @@ class CProgram:
         shape = "".join(f"[{n}]" for n in values.shape)
         return f"static const {self.real} {name}{shape} = {self._numbers(values)};"
 
-    def records(self, kind: Record, name: str, values: np.ndarray) -> str:
+    def records(self, kind: NumpyRecord, name: str, values: np.ndarray) -> str:
         """A constant record, or a table of records, with the fields that the functions use."""
         shape = "".join(f"[{n}]" for n in values.shape)
         texts = [
@@ -125,11 +125,11 @@ class CProgram:
             self.structs[kind.name] = "typedef struct {\n" + "\n".join(lines) + f"\n}} {kind.name};"
         return kind
 
-    def use(self, record: Record, name: str) -> None:
+    def use(self, record: NumpyRecord, name: str) -> None:
         """Remember that a field of a record is read or written: others are left out."""
         self.used.setdefault(record, set()).add(name)
 
-    def _fields(self, record: Record) -> list[str]:
+    def _fields(self, record: NumpyRecord) -> list[str]:
         """The fields of a record that the functions use."""
         return [name for name, _ in record.fields if name in self.used.get(record, ())]
 
@@ -149,7 +149,7 @@ class CProgram:
             shape = "".join(f"[{n}]" for n in kind.shape[1:])
             place = f"{name}[{kind.shape[0]}]" if not pointer else f"(*{name})" if shape else f"*{name}"
             return f"{'const ' if constant else ''}{self._item(kind.item)} {place}{shape}"
-        if isinstance(kind, Record):
+        if isinstance(kind, NumpyRecord):
             return f"{kind.name} *{name}"
         if isinstance(kind, Struct):
             return f"{kind.name} {name}"
@@ -158,8 +158,8 @@ class CProgram:
         assert isinstance(kind, Scalar)
         return f"{self._item(kind)} {name}"
 
-    def _item(self, kind: Scalar | Record) -> str:
-        return kind.name if isinstance(kind, Record) else self.real if kind == REAL else "int"
+    def _item(self, kind: Scalar | NumpyRecord) -> str:
+        return kind.name if isinstance(kind, NumpyRecord) else self.real if kind == REAL else "int"
 
     def text(self) -> str:
         """All of it: structs, tables, functions."""

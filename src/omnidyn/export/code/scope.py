@@ -6,7 +6,7 @@ import ast
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from omnidyn.export.code.c_types import Many, Record, Struct, Type
+from omnidyn.export.code.c_types import Many, NumpyRecord, Struct, Type
 from omnidyn.export.code.sources import Source
 
 
@@ -36,7 +36,7 @@ class Whole(Protocol):
     def constant(self, name: str, value: Any) -> tuple[str, Type]: ...
     def struct(self, cls: type, *kinds: Type) -> Struct: ...
     def packed(self, kind: Many, items: list[str]) -> str: ...
-    def use(self, record: Record, name: str) -> None: ...
+    def use(self, record: NumpyRecord, name: str) -> None: ...
 
 
 class Scope(Protocol):

@@ -22,12 +22,13 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.commands import MAX_DT
 from omnidyn.simulation.engine import LARGEST_START
-from omnidyn.simulation.exact import inductance, march
+from omnidyn.simulation.exact import exact_march, inductance
+from omnidyn.simulation.exact.exact_march import NODES, WEIGHTS, axis_levels
 from omnidyn.simulation.exact.inductance import COUNT, GAUSS, Axes, Nodes, axis_laws, axis_rates, current_gain
 from omnidyn.simulation.exact.inductance_step import AxisLaw
-from omnidyn.simulation.exact.march import NODES, WEIGHTS, axis_levels
 
-MARCH, PLACE = "omnidyn.simulation.exact.march", "omnidyn.simulation.exact.inductance"
+STEP, MARCH = "omnidyn.simulation.exact.step", "omnidyn.simulation.exact.exact_march"
+PLACE = "omnidyn.simulation.exact.inductance"
 AXES = Array((3,))
 # Of one while loop: pieces of a way, events of an axis. A step of 1 s at 1000 rad/s takes 4000 and 200.
 MOST_TURNS, MOST_TURNS_WITH_INDUCTANCE = 16_000, 1_000
@@ -85,7 +86,7 @@ def _settled(program: CProgram) -> dict[tuple[str, str], tuple[Type, ...]]:
     """The kernels of a robot whose currents settle at once, with the types of their arguments."""
     nodes = Array(NODES.shape)
     return {
-        (MARCH.replace("march", "step"), "held"): (REAL, REAL),
+        (STEP, "held"): (REAL, REAL),
         (MARCH, "exact_step"): (REAL,) * 7,
         (MARCH, "pieces"): (REAL,) * 7,
         (MARCH, "travel"): (AXES,) * 6 + (REAL, nodes, nodes),
@@ -140,7 +141,7 @@ def refusals(robot: Robot, single: bool = False) -> str:
 def _advance(program: CProgram, robot: Robot) -> str:
     """The step with what it checks before and after."""
     dynamic, single = robot.motor.electrical == DYNAMIC, program.single
-    piece = inductance.PIECE if dynamic else march.PIECE  # [rad] at the most that a turn of the loop takes
+    piece = inductance.PIECE if dynamic else exact_march.PIECE  # [rad] at the most that a turn of the loop takes
     return filled(
         _ADVANCE_WITH_INDUCTANCE if dynamic else _ADVANCE,
         REAL=program.real,

@@ -19,7 +19,7 @@ from omnidyn.export.code.c_types import (
     REAL,
     Array,
     Many,
-    Record,
+    NumpyRecord,
     Scalar,
     Struct,
     Type,
@@ -254,7 +254,7 @@ class FunctionBody:
                 return []
             if value is not None:
                 self.writes_to(value)
-        return [f"{c_name(target.id)} = {address(text) if isinstance(kind, Record) else _bare(text)};"]
+        return [f"{c_name(target.id)} = {address(text) if isinstance(kind, NumpyRecord) else _bare(text)};"]
 
     def _several(self, targets: ast.Tuple, values: ast.Tuple) -> list[str]:
         """a, b = x, y: through temporaries where a later value needs what an earlier target held."""
@@ -270,8 +270,8 @@ class FunctionBody:
         before, after = [], []
         for target, (text, kind) in zip(targets.elts, texts, strict=True):
             name = self._temporary(kind)
-            before.append(f"{name} = {address(text) if isinstance(kind, Record) else _bare(text)};")
-            after += self._put(target, f"(*{name})" if isinstance(kind, Record) else name, kind)
+            before.append(f"{name} = {address(text) if isinstance(kind, NumpyRecord) else _bare(text)};")
+            after += self._put(target, f"(*{name})" if isinstance(kind, NumpyRecord) else name, kind)
         return before + after
 
     def _unpack(self, targets: ast.Tuple, value: ast.expr) -> list[str]:

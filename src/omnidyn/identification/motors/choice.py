@@ -15,10 +15,16 @@ from omnidyn.identification.methods import AUTO
 from omnidyn.identification.motors.estimate import BAND, OFFSET, MotorEstimate
 from omnidyn.identification.motors.fit import MotorFits, fit_motor, fit_ways, logs_of_free_runs
 from omnidyn.identification.motors.log import CURVE, HOLD, MEAN, SUB
-from omnidyn.identification.motors.problem import SPEED, MotorEngine, motor_problem, motor_record
+from omnidyn.identification.motors.problem import SPEED, motor_problem, motor_record
 from omnidyn.identification.output_error.problem.record import SHORTEST
+from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run, as_list
+
+SHARES = 4  # parts in time of a single log, of which each is left out
+BLOCKS = 12  # of all logs left out, which are predicted each by itself
+
+Score = Callable[[MotorEstimate, Sequence[Run]], float]
 
 
 def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]:
@@ -38,7 +44,7 @@ def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]
     values = [fit.value.get(name, latency) for name in problem.names]
     point = replace(problem.start(), values=np.array(values))
     speeds_by_record = {id(r): np.full(len(r.t), np.nan) for r in records}
-    for piece, (predicted, _) in zip(problem.pieces, MotorEngine(problem).outputs(point), strict=True):
+    for piece, (predicted, _) in zip(problem.pieces, problem.engine.outputs(point), strict=True):
         rows = slice(piece.first, piece.last + 1)
         speeds_by_record[id(piece.record)][rows] = predicted[rows, 0]
     step = SUB if fit.between == CURVE else 1
@@ -62,13 +68,32 @@ def fit_rmse(fit: MotorEstimate, runs: Run | Sequence[Run]) -> float:
     return float(np.sqrt(np.mean(all_errors**2))) if len(all_errors) else float("nan")
 
 
+def block_errors(
+    fit: MotorEstimate, runs: Sequence[Run], score: Score = fit_rmse, count: int | None = None
+) -> FloatArray:
+    """Squared errors of free runs over blocks of logs, each by itself; NaN where one has none. count: of each log."""
+    errors = []
+    for run in runs:
+        for block in parts_of(run, count or -(-BLOCKS // len(runs))):
+            try:
+                errors.append(score(fit, [block]) ** 2)
+            except OmnidynError:
+                errors.append(np.nan)
+    return np.array(errors)
+
+
+def parts_of(run: Run, count: int) -> list[Run]:
+    """A log in so many parts in time."""
+    edges = np.linspace(0, len(run), count + 1).astype(int).tolist()
+    return [
+        run.replace(t=run.t[a:b], **{name: values[a:b] for name, values in run.channels.items()})
+        for a, b in pairwise(edges)
+    ]
+
+
 # ---- the way that best predicts logs left out
 
-TIE = 0.01  # relative difference of errors that does not pay for one more number
-SHARES = 4  # parts in time of a single log
-
 Way = Mapping[str, Any]  # options of fit_motor
-Score = Callable[[MotorEstimate, Sequence[Run]], float]
 
 WAYS = tuple(
     {"between": between, "latency": latency, "dead_band": dead_band}
@@ -79,12 +104,14 @@ WAYS = tuple(
 @dataclass(frozen=True, eq=False)
 class MotorChoice:
     """way: the options chosen; fit: with them, to all logs; errors: of every way on the logs left out, in the order
-    tried, infinite where a fit without one of the logs was not possible.
+    tried, infinite where a fit without one of the logs was not possible. comparison: with the simplest of them, of
+    blocks of the logs left out; None where it is that.
     """
 
     way: Way
     fit: MotorEstimate
     errors: tuple[tuple[Way, float], ...]
+    comparison: BlockComparison | None = None
 
 
 def choose_motor(
@@ -92,22 +119,26 @@ def choose_motor(
 ) -> MotorChoice:
     """Fit a motor in the way that best predicts logs left out, one after the other; a single log by parts in time.
 
-    ways: options of `fit_motor`, simplest first: a later one must be better by TIE. score: error of a fit on runs, by
-    default of the speed [rad/s]; combined as root mean square. shared: options that all ways have.
+    ways: options of `fit_motor`, simplest first: a later one must predict blocks of the logs left out better
+    (`compare_blocks`). score: error of a fit on runs, by default of the speed [rad/s]; combined as root mean square.
+    shared: options that all ways have.
     Raises InsufficientDataError where no way could be tried, and what `fit_motor` raises.
     """
     logs = as_list(runs)
     left_out = _LeftOut(logs, motor, score)
-    errors = tuple((way, left_out.error({**shared, **way})) for way in ways)
-    best: tuple[Way, float] | None = None
-    for way, error in errors:
-        if np.isfinite(error) and (best is None or error < (1.0 - TIE) * best[1]):
-            best = way, error
-    if best is None:
+    tried = [(way, *left_out.errors({**shared, **way})) for way in ways]
+    possible = [(way, blocks) for way, error, blocks in tried if np.isfinite(error)]
+    if not possible:
         raise InsufficientDataError(
             "no log can be predicted from the others", got=f"{len(logs)} logs", expected="more, or longer ones"
         )
-    return MotorChoice(best[0], fit_motor(logs, motor, **{**shared, **best[0]}), errors)
+    simplest = best = possible[0]
+    for candidate in possible[1:]:
+        if compare_blocks(best[1], candidate[1]).is_better:
+            best = candidate
+    comparison = None if best is simplest else compare_blocks(simplest[1], best[1])
+    fit = fit_motor(logs, motor, **{**shared, **best[0]})
+    return MotorChoice(best[0], fit, tuple((way, error) for way, error, _ in tried), comparison)
 
 
 class _LeftOut:
@@ -118,8 +149,8 @@ class _LeftOut:
         self.options: Mapping[str, Any] | None = None
         self.fits: list[MotorFits] = []
 
-    def error(self, fit_options: Mapping[str, Any]) -> float:
-        """Root mean square of the scores of all folds, infinite where a fit was not possible."""
+    def errors(self, fit_options: Mapping[str, Any]) -> tuple[float, FloatArray]:
+        """(root mean square of the scores of all folds, infinite where a fit was not possible; squared, of blocks)."""
         options = {name: value for name, value in fit_options.items() if name != "between"}
         between = fit_options.get("between", AUTO)
         try:
@@ -127,24 +158,19 @@ class _LeftOut:
                 self.options, self.fits = options, []
                 self.fits = [fit_ways(fitted_runs, self.motor, **options) for fitted_runs, _ in self.folds]
             if not self.fits:  # the fit before, with the same options, was not possible
-                return float("inf")
-            errors = [
-                self.score(fits.estimate(between), [left_out_run])
-                for fits, (_, left_out_run) in zip(self.fits, self.folds, strict=True)
-            ]
+                return float("inf"), np.zeros(0)
+            estimates = [fits.estimate(between) for fits in self.fits]
+            left_out = [run for _, run in self.folds]
+            errors = [self.score(fit, [run]) for fit, run in zip(estimates, left_out, strict=True)]
         except OmnidynError:
-            return float("inf")
-        return float(np.sqrt(np.mean(np.square(errors))))
+            return float("inf"), np.zeros(0)
+        count = -(-BLOCKS // len(left_out))
+        blocks = [block_errors(fit, [run], self.score, count) for fit, run in zip(estimates, left_out, strict=True)]
+        return float(np.sqrt(np.mean(np.square(errors)))), np.concatenate(blocks)
 
 
 def _folds(runs: Sequence[Run]) -> Iterator[tuple[list[Run], Run]]:
     """(logs kept, the one left out)."""
-    parts = list(runs)
-    if len(runs) == 1:
-        edges = np.linspace(0, len(runs[0]), SHARES + 1).astype(int)
-        parts = [
-            runs[0].replace(t=runs[0].t[a:b], **{name: values[a:b] for name, values in runs[0].channels.items()})
-            for a, b in pairwise(edges.tolist())
-        ]
+    parts = parts_of(runs[0], SHARES) if len(runs) == 1 else list(runs)
     for k, left_out_run in enumerate(parts):
         yield [*parts[:k], *parts[k + 1 :]], left_out_run

@@ -20,7 +20,6 @@ from omnidyn.statement import NOTE, WARNING, Statement
 
 SLOPE, BAND, OFFSET, LAG, INERTIA, LATENCY = "slope", "dead_band", "offset", "lag", "inertia", "latency"
 WINDOWS, FREE_RUN = "windows", "free run"
-PAYS = 0.01  # share by which the error on held-out logs must fall for a dead band to pay
 LATE_ROWS = 2.0  # rows: a drive that is later is rare
 HEAD = (
     "motor",
@@ -52,6 +51,7 @@ class MotorEstimate:
     does not resolve the input there. one_way: it turned one way only, so a dead band and an offset of the input are
     one. held_out [rad/s]: error of free runs on logs that were not fitted. source: the logs. answers: whether its
     speed goes with its input. travel: "rad", or "m" of a linear axis: what stands here in rad is in that.
+    on_held_out: of blocks of these logs with those that slope and lag alone leave.
     rejected: numbers that held-out blocks do not need, with their intervals; comparisons: of them, by these blocks.
     Of windows: rest, the largest input under which the motor stayed at rest, NaN where it never rested; draws: of the
     bootstrap, by name. Of a free run: between, noise by channel, kind of the covariance, whether the fit converged.
@@ -82,6 +82,7 @@ class MotorEstimate:
     converged: bool = True
     answers: bool = True
     blocks: HeldOut | None = None
+    on_held_out: BlockComparison | None = None
     rejected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     comparisons: Mapping[str, BlockComparison] = field(default_factory=dict)
     travel: str = "rad"
@@ -97,6 +98,13 @@ class MotorEstimate:
         """
         is_determined = BAND in self.value and BAND not in self.unidentifiable and BAND not in self.rejected
         return is_determined and self.ci95[BAND][0] > 0.0 and self.ci95[SLOPE][0] > 0.0
+
+    @property
+    def dead_band_needed(self) -> bool:
+        """Whether a dead band was fitted that held-out blocks need, however well its size is known."""
+        has_value = BAND in self.value and BAND not in (*self.rejected, *self.unidentifiable)
+        comparison = self.blocks.comparison if self.blocks else None
+        return has_value and comparison is not None and comparison.is_better
 
     @property
     def offset_seen(self) -> bool:
@@ -182,8 +190,10 @@ class MotorEstimate:
         return statements
 
     def _of_dead_band(self, has_start: bool) -> Statement:
+        if has_start and BAND in self.value and not (self.dead_band_seen or self.dead_band_needed):
+            return Statement("dead_band_of_starts", NOTE)
         if BAND in self.rejected:
-            numbers = {"high": self.rejected[BAND][1], "unit": self.unit, "better": None, "blocks": None}
+            numbers = {"high": max(self.rejected[BAND][1], 0.0), "unit": self.unit, "better": None, "blocks": None}
             if comparison := self.comparisons.get(BAND):
                 numbers |= {"better": comparison.better, "blocks": comparison.blocks}
             return Statement("dead_band_rejected", NOTE, numbers=numbers)
@@ -196,6 +206,8 @@ class MotorEstimate:
             return Statement("line_meets_zero" if has_start else "dead_band_seen", NOTE, numbers=numbers | one_way)
         if BAND in self.unidentifiable:
             return Statement("dead_band_bounded", NOTE, numbers=numbers)
+        if self.dead_band_needed:
+            return Statement("dead_band_hardly_known", NOTE, numbers=numbers)
         if high < 0.0:
             return Statement("dead_band_negative", WARNING, numbers=numbers)
         return Statement("slope_may_be_zero" if low > 0.0 else "dead_band_not_needed", NOTE, numbers=numbers)

@@ -32,7 +32,6 @@ from omnidyn.identification.motors.estimate import (
 from omnidyn.identification.motors.log import CURVE, WORDS, MotorLog, follows, motor_logs, orientation_of
 from omnidyn.identification.motors.problem import (
     SPEED,
-    MotorEngine,
     MotorProblem,
     begin,
     begin_at,
@@ -177,7 +176,7 @@ def solved(
 
     degrees: of Student's t, 0 for Gauss.
     """
-    solver = Solver(problem, MotorEngine(problem), degrees)
+    solver = Solver(problem, problem.engine, degrees)
     starts = [] if near_values is None else [begin_at(problem, near_values)]
     starts += [begin(problem, lag) for lag in LAGS] if is_global or near_values is None else []
     return min((solver.minimise(start) for start in starts), key=lambda end: end.state.objective)
@@ -295,7 +294,7 @@ def _answer(
     if parameters_at_bound.keys() & {SLOPE, LAG}:
         std[INERTIA], ci95[INERTIA] = float("nan"), (0.0, float("inf"))
     names = [name for name in (SLOPE, BAND, OFFSET, LAG, INERTIA, *problem.names) if name in value]
-    rows, rmse = _speed_errors(MotorEngine(problem), solution.state.point)
+    rows, rmse = _speed_errors(problem, solution.state.point)
     size = uncertainty.std[0] * uncertainty.std[band_index]
     correlation = (
         float(uncertainty.covariance[0, band_index] / size)
@@ -340,10 +339,10 @@ def _of_product(problem: MotorProblem, uncertainty: Trust, inertia: float) -> tu
     return inertia * spread, (inertia * float(np.exp(-half)), inertia * float(np.exp(half)))
 
 
-def _speed_errors(engine: MotorEngine, point: Point) -> tuple[int, float]:
+def _speed_errors(problem: MotorProblem, point: Point) -> tuple[int, float]:
     """(rows, root mean square of the error of the speed [rad/s]), of the steps of an angle where no speed is known."""
     squares, count = 0.0, 0
-    for piece, (predicted, _) in zip(engine.problem.pieces, engine.outputs(point), strict=True):
+    for piece, (predicted, _) in zip(problem.pieces, problem.engine.outputs(point), strict=True):
         rows = slice(piece.first, piece.last + 1)
         if SPEED in piece.record.columns:
             error = (predicted - piece.record.outputs)[rows, piece.record.columns.index(SPEED)]
@@ -434,14 +433,13 @@ def _regression(solver: Solver[MotorProblem], point: Point) -> tuple[FloatArray,
 
     Slopes by the parameters, by the speed at which each piece starts, and by the bends.
     """
-    problem, engine = solver.problem, solver.engine
-    assert isinstance(engine, MotorEngine)
+    problem = solver.problem
     count, pieces = len(problem.parameters), problem.pieces
     slope, lag = (float(point.values[problem.where(key)]) for key in (SLOPE, LAG))
     k = problem.where(f"{LATENCY}.{SPEED[0]}")
     latency = float(point.values[k]) if k >= 0 else 0.0
     residuals, slope_rows, numbers = [], [], []
-    for n, (piece, (predicted, output_slopes)) in enumerate(zip(pieces, engine.outputs(point), strict=True)):
+    for n, (piece, (predicted, output_slopes)) in enumerate(zip(pieces, problem.engine.outputs(point), strict=True)):
         if SPEED not in piece.record.columns:
             continue
         c = piece.record.columns.index(SPEED)

@@ -2,7 +2,8 @@
 
 The rows are cut into blocks of equal length. A fifth of them at a time has no outputs for a fit, and is predicted by
 its free run, which goes on through them under the input of the log. Of dead band, offset and latency the one is left
-out that held-out rows need least, as long as the blocks do not need it by more than chance (`compare_blocks`).
+out that held-out rows need least, as long as the blocks do not need it by more than chance (`compare_blocks`). A dead
+band or an offset whose interval reaches 0 is left out as well: the likelihood stands beside the blocks.
 """
 
 from __future__ import annotations
@@ -20,17 +21,19 @@ from omnidyn.identification.methods import degrees as degrees_of
 from omnidyn.identification.motors.estimate import BAND, LATENCY, OFFSET, MotorEstimate
 from omnidyn.identification.motors.fit import fit_motor, solved
 from omnidyn.identification.motors.log import WORDS, MotorLog
-from omnidyn.identification.motors.problem import MotorEngine, MotorProblem, MotorRecord, motor_problem, motor_record
+from omnidyn.identification.motors.problem import MotorProblem, MotorRecord, motor_problem, motor_record
 from omnidyn.identification.motors.rest import turns_both_ways
 from omnidyn.identification.motors.windows import line_numbers
 from omnidyn.identification.output_error.problem.nuisances import earliest
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
+from omnidyn.statement import WARNING, Statement
 
 NUMBERS = (BAND, OFFSET, LATENCY)
 FOLDS, BLOCKS, LEAST_BLOCK = 5, 20, 8  # rows of a block at least
 BLOCK_ITERATIONS = 12  # iterations of a fit without some blocks, which begins at that to all
+ANSWERS = 0.5  # of the spread of held-out rows: a free run that misses less follows its input
 ERROR_LIMIT = 5.0  # scales of the noise that an error counts at most, where it is that of Student's t
 
 
@@ -66,13 +69,21 @@ class ModelChoice:
 
 
 def choose_model(
-    logs: Sequence[MotorLog], motor: int, between: str, loss: str, wanted_names: Sequence[str] | None = None
+    logs: Sequence[MotorLog],
+    motor: int,
+    between: str,
+    loss: str,
+    wanted_names: Sequence[str] | None = None,
+    unseen: Sequence[str] = (),
 ) -> ModelChoice | None:
     """What a motor needs; None where the logs are too short to hold any block out.
 
     wanted_names: of NUMBERS, all of which are taken; None: those that pay. between, loss: as `fit_motor` has them.
+    unseen: those that are not taken, for their intervals reach 0.
     """
-    candidate_names = tuple(name for name in NUMBERS if wanted_names is None or name in wanted_names)
+    candidate_names = tuple(
+        name for name in NUMBERS if (wanted_names is None or name in wanted_names) and name not in unseen
+    )
     if not turns_both_ways(logs, motor):
         candidate_names = tuple(name for name in candidate_names if name != OFFSET)
     held_out = _HeldOut(logs, motor, degrees_of(loss))
@@ -140,7 +151,7 @@ class _HeldOut:
         squares, rows = np.zeros((2, BLOCKS, len(problem.columns)))
         for fold in range(FOLDS):
             point = self._without(records, [record_blocks % FOLDS == fold for record_blocks in block], names, full_fit)
-            outputs = MotorEngine(problem).outputs(point)
+            outputs = problem.engine.outputs(point)
             for piece, (predicted, _) in zip(problem.pieces, outputs, strict=True):
                 column_indices = [problem.columns.index(column) for column in piece.record.columns]
                 piece_blocks = block[next(k for k, record in enumerate(records) if record is piece.record)]
@@ -178,7 +189,7 @@ class _HeldOut:
             for record, record_mask in zip(records, held_out_rows, strict=True)
         ]
         problem = _problem(kept_records, names)
-        solver = Solver(problem, MotorEngine(problem), self.degrees)
+        solver = Solver(problem, problem.engine, self.degrees)
         scales = full_fit.state.variance if self.degrees else None
         return solver.minimise(full_fit.state.point, BLOCK_ITERATIONS, scales=scales).state.point
 
@@ -233,18 +244,33 @@ def written_and_plain(logs: Sequence[MotorLog], motor: int, method: MotorFit) ->
 
     if choice is None:
         return fit(wanted_names or (BAND,), None), fit((), None)
+    written_fit = fit(choice.model.names, choice.model)
+    unseen: dict[str, tuple[float, float]] = {}
+    while wanted_names is None and (reaching := _reaching_zero(written_fit, choice.model.names)):
+        unseen |= reaching
+        choice = choose_model(logs, motor, method.between, method.loss, unseen=tuple(unseen)) or choice
+        written_fit = fit(choice.model.names, choice.model)
     model, plain_model = choice.model, choice.plain_model
-    written_fit = fit(model.names, model)
-    intervals = {name: _interval(fit((*model.names, name), model), name) for name in choice.rejected}
+    intervals = unseen | {name: _interval(fit((*model.names, name), model), name) for name in choice.rejected}
     blocks = HeldOut(model.size, plain_model.size, comparison=model.beside(plain_model) if model.names else None)
-    latency_notes = tuple(written_fit.late_statements(min(log.step for log in logs)))
+    notes = tuple(written_fit.late_statements(min(log.step for log in logs)))
+    follows_input = blocks.written < ANSWERS
+    if follows_input and not written_fit.answers:
+        notes += (Statement("answers_by_free_run", WARNING),)
     return replace(
         written_fit,
         blocks=blocks,
         rejected=intervals,
         comparisons=choice.comparisons,
-        warnings=(*written_fit.warnings, *latency_notes),
+        answers=written_fit.answers or follows_input,
+        warnings=(*written_fit.warnings, *notes),
     ), fit((), plain_model)
+
+
+def _reaching_zero(fit: MotorEstimate, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """The dead band and the offset that a fit does not tell from 0, with their intervals: the first of them."""
+    ends = {name: fit.ci95[name] for name in (OFFSET, BAND) if name in names}
+    return dict([item for item in ends.items() if item[1][0] <= 0.0 <= item[1][1]][:1])
 
 
 def _interval(fit: MotorEstimate, name: str) -> tuple[float, float]:

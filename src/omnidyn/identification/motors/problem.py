@@ -11,9 +11,9 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.motors.estimate import BAND, LAG, LATENCY, OFFSET, SLOPE
 from omnidyn.identification.motors.log import CURVE, MEAN, SUB, MotorLog, refined, rows_with
-from omnidyn.identification.output_error.engines.engine import Engine, Weighting
+from omnidyn.identification.output_error.engines.engine import FitEngine, Weighting
 from omnidyn.identification.output_error.engines.exact import march_piece, padded, used_by
-from omnidyn.identification.output_error.kernel.march import KEEP, PATH, Physics, PhysicsSlopes
+from omnidyn.identification.output_error.kernel.march_sums import KEEP, PATH, Physics, PhysicsSlopes
 from omnidyn.identification.output_error.problem.nuisances import (
     LEAST_LATENCY,
     MOST_LATENCY,
@@ -22,7 +22,7 @@ from omnidyn.identification.output_error.problem.nuisances import (
     errors_from_rest,
 )
 from omnidyn.identification.output_error.problem.parameters import Parameter
-from omnidyn.identification.output_error.problem.problem import Fitted, Piece, PieceSums, Point
+from omnidyn.identification.output_error.problem.problem import FitProblem, Piece, PieceSums, Point
 from omnidyn.identification.output_error.problem.record import SHORTEST, Record
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.model.actuation import Driver
@@ -179,14 +179,19 @@ SPEED, ANGLE = ("wheel_speed", 0), ("wheel_angle", 0)  # columns
 
 
 @dataclass(frozen=True, eq=False)
-class MotorProblem(Fitted):
+class MotorProblem(FitProblem):
     """parameters: slope, lag, a dead band and an offset where asked for, latencies. pieces: what is fitted to."""
 
     parameters: tuple[Parameter, ...]
     pieces: tuple[Piece, ...]
 
+    @property
+    def engine(self) -> MotorEngine:
+        """What simulates it, with derivatives."""
+        return MotorEngine(self)
 
-class MotorEngine(Engine[MotorProblem]):
+
+class MotorEngine(FitEngine[MotorProblem]):
     """Residuals and sensitivities of a motor by the exact step."""
 
     def __init__(self, problem: MotorProblem):
@@ -256,7 +261,7 @@ class MotorEngine(Engine[MotorProblem]):
 
 
 def step_numbers(values: FloatArray, at_band: int, room: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """(law (3, 3), its slopes (2, 3, room), drive (3, 1), its slopes (3, 1, room)), as kernel/march.py has them.
+    """(law (3, 3), its slopes (2, 3, room), drive (3, 1), its slopes (3, 1, room)), as kernel/march_sums.py has them.
 
     values: slope, lag, and at `at_band`, if that is not -1, the dead band; slopes are by each of the values.
     """

@@ -104,6 +104,10 @@ class SteadyCurve:
             rmse=self.neighbours,
             unidentifiable=tuple(no_numbers),
             warnings=(),
+            held_out=math.nan,  # that and the blocks are of the line
+            blocks=None,
+            rejected={},
+            comparisons={},
         )
 
     def start(self, start: MotorStart) -> MotorStart:
@@ -262,8 +266,12 @@ def _by_level(level: FloatArray, size: FloatArray, std: FloatArray) -> tuple[Flo
     """(level, speed, its error) of each level, at most so many and rising; what falls is one with its neighbour."""
     order = np.argsort(level)
     level, size, std = level[order], size[order], std[order]
-    is_new_level = np.diff(level, prepend=-np.inf) > SAME_LEVEL * level.max(initial=0.0)
-    groups = [[*range(a, b)] for a, b in pairwise([*np.flatnonzero(is_new_level).tolist(), len(level)])]
+    groups: list[list[int]] = []
+    for k in range(len(level)):
+        if groups and level[k] - level[groups[-1][0]] <= SAME_LEVEL * level.max(initial=0.0):
+            groups[-1].append(k)
+        else:
+            groups.append([k])
     while len(groups) > MOST_LEVELS:
         k = int(np.argmin([level[b[-1]] - level[a[0]] for a, b in pairwise(groups)]))
         groups[k : k + 2] = [groups[k] + groups[k + 1]]

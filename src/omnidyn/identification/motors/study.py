@@ -17,8 +17,8 @@ from omnidyn.findings.fitness import MOTORS as MOTORS_USE
 from omnidyn.identification.grouping import held_out
 from omnidyn.identification.log_verdicts import checked, log_verdicts, of_motors, told_why, unfit, verdict_advice
 from omnidyn.identification.methods import OUTPUT_ERROR, STEADY_STATE, MotorFit, MotorLine
-from omnidyn.identification.motors.choice import fit_rmse
-from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
+from omnidyn.identification.motors.choice import block_errors, fit_rmse
+from omnidyn.identification.motors.estimate import HEAD, MotorEstimate, named
 from omnidyn.identification.motors.fit import logs_of_free_runs
 from omnidyn.identification.motors.held_out import written_and_plain
 from omnidyn.identification.motors.log import (
@@ -50,6 +50,7 @@ from omnidyn.identification.motors.steady_curve import (
 )
 from omnidyn.identification.motors.window_fit import fit_line
 from omnidyn.identification.motors.windows import MotorWindows, motor_windows
+from omnidyn.identification.selection.blocks import compare_blocks
 from omnidyn.logs.log import Log
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.robot import Robot
@@ -73,11 +74,11 @@ SAME_SPEED = 1e-9  # spread of speeds over the largest, below which they are one
 class MotorStudy(Displayable):
     """motors: an estimate each, the last for all together where there are several in windows.
 
-    plain: the same motors by slope and lag alone, from free runs only. method, kind, unit, speed_from: how they were
-    found. windows: that the lines go through, None of free runs; drawn: those of a picture of free runs. starts: each
-    direction of each motor by itself, with the input at which it sets off. supply [V]: of a duty, the mean of the logs;
-    NaN where it is not logged. log_warnings: of the logs; `warnings` has those of each motor too. verdicts:
-    of `check` on each log. curves: of the motors whose speed is no line of their input.
+    plain: the same motors by slope and lag alone, from free runs only, and not of those with a curve. method, kind,
+    unit, speed_from: how they were found. windows: that the lines go through, None of free runs; drawn: those of a
+    picture of free runs. starts: each direction of each motor by itself, with the input at which it sets off. supply
+    [V]: of a duty, the mean of the logs; NaN where it is not logged. log_warnings: of the logs; `warnings` has those of
+    each motor too. verdicts: of `check` on each log. curves: of the motors whose speed is no line of their input.
     """
 
     method: str
@@ -113,15 +114,20 @@ class MotorStudy(Displayable):
         motor_statements = [motor.statement(has_start=motor.motor in motors_with_start) for motor in lines]
         motor_statements += [curve.statement() for curve in self.curves]
         motor_statements += [statement for motor in self.motors if (statement := motor.of_blocks())]
-        for estimate, plain_motor in zip(self.motors, self.plain, strict=False):
-            if estimate.dead_band_seen and estimate.held_out > (1.0 - PAYS) * plain_motor.held_out:
+        for estimate in self.motors:
+            plain_motor, comparison = self._plain_of(estimate), estimate.on_held_out
+            if plain_motor and comparison and estimate.dead_band_seen and not comparison.is_better:
                 errors = {"written": estimate.held_out, "plain": plain_motor.held_out, "travel": estimate.travel}
-                motor_statements.append(Statement("held_out_no_better", WARNING, estimate.name, errors))
+                numbers = errors | comparison.counts
+                motor_statements.append(Statement("held_out_no_better", WARNING, estimate.name, numbers))
         return (
             *motor_statements,
             *(start.statement() for start in self.starts),
             *slopes_by_direction(self.starts, self.motors[0].travel),
         )
+
+    def _plain_of(self, motor: MotorEstimate) -> MotorEstimate | None:
+        return next((plain_motor for plain_motor in self.plain if plain_motor.motor == motor.motor), None)
 
     @property
     def verdict(self) -> Statement:
@@ -158,7 +164,7 @@ class MotorStudy(Displayable):
             method_words = f"windows of {self.windows.length:g} s in integral form"
             if self.windows.settled:
                 method_words = "steady windows" if math.isfinite(self.windows.length) else "a point per row"
-        pairs = zip(self.motors, self.plain, strict=True) if self.plain else ((motor,) for motor in self.motors)
+        pairs = [filter(None, (motor, self._plain_of(motor))) for motor in self.motors]
         parts = [
             f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {method_words}",
             "",
@@ -179,8 +185,9 @@ class MotorStudy(Displayable):
     def to_dict(self) -> dict[str, Any]:
         """The study as JSON can hold it."""
         motors = [motor.to_dict() for motor in self.motors]
-        for record, plain_motor in zip(motors, self.plain, strict=False):
-            record["plain"] = plain_motor.to_dict()
+        for record, motor in zip(motors, self.motors, strict=True):
+            if plain_motor := self._plain_of(motor):
+                record["plain"] = plain_motor.to_dict()
         return {
             **as_verdict(self.verdict),
             "ok": not self.failed,
@@ -262,18 +269,18 @@ def _lines(logs: Sequence[MotorLog], method: MotorLine) -> MotorStudy:
 def _along(study: MotorStudy, curves_found: Curves) -> MotorStudy:
     """The study with what is left of the lines of motors whose speed is none."""
     curves, notes = curves_found
-    study = replace(study, log_warnings=(*study.log_warnings, *notes))
     curve_by_motor = {curve.motor: curve for curve in curves}
+    bent_names = {f"motor {motor + 1}" for motor in curve_by_motor}
+    of_lines = [w for w in study.log_warnings if not (w.code == "dead_bands_apart" and w.subject in bent_names)]
+    study = replace(study, log_warnings=(*of_lines, *notes))
     if not curve_by_motor:
         return study
-    motors, plain_estimates = (
-        tuple(
-            curve_by_motor[m.motor].estimate(m) if m.motor in curve_by_motor else m
-            for m in estimates
-            if m.motor is not None
-        )
-        for estimates in (study.motors, study.plain)
+    motors = tuple(
+        curve_by_motor[m.motor].estimate(m) if m.motor in curve_by_motor else m
+        for m in study.motors
+        if m.motor is not None
     )
+    plain_estimates = tuple(m for m in study.plain if m.motor not in curve_by_motor)
     starts = tuple(curve_by_motor[s.motor].start(s) if s.motor in curve_by_motor else s for s in study.starts)
     return replace(study, motors=motors, plain=plain_estimates, starts=starts, curves=curves)
 
@@ -309,7 +316,8 @@ def study_points(points: MotorTable, origin: str = "a table", remarks: Sequence[
     windows = windows_of_points(points, origin)
     _, lines = _of_each(windows, points.source)
     lines = tuple(
-        line if line.motor is None else line.bounded(windows.turned_under(line.motor), line.rest) for line in lines
+        line if line.motor is None else line.bounded(windows.turned_under(line.motor), line.rest)
+        for line in (_with_misses(line, windows) for line in lines)
     )
     study = MotorStudy(
         STEADY_STATE,
@@ -339,8 +347,12 @@ def _free_runs(runs: Sequence[Run], method: MotorFit, hold_out: Sequence[str], p
     pairs = []
     for motor in motors:
         progress(Report(f"fitting motor {motor + 1} of {len(motors)}"))
-        fits = written_and_plain(logs, motor, method)
-        pairs.append([replace(fit, held_out=fit_rmse(fit, held_out_runs)) if held_out_runs else fit for fit in fits])
+        written, plain = written_and_plain(logs, motor, method)
+        if held_out_runs:
+            comparison = compare_blocks(*(block_errors(fit, held_out_runs) for fit in (plain, written)))
+            written = replace(written, held_out=fit_rmse(written, held_out_runs), on_held_out=comparison)
+            plain = replace(plain, held_out=fit_rmse(plain, held_out_runs))
+        pairs.append((written, plain))
     bands, plain_motors = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
     slow = is_slow(logs)
@@ -426,6 +438,9 @@ def motors_verdict(
     straight = [line.name for line in lines if line.motor not in curve_by_motor and line.name not in missed_names]
     names_without_start = [name for name in straight if not levels[name] and name not in blind_names]
     parts = [_starts(started_motors, levels, starts, len(lines))] if started_motors else []
+    if unsure_names := [line.name for line in lines if line.name in names_without_start and line.dead_band_needed]:
+        names_without_start = [name for name in names_without_start if name not in unsure_names]
+        parts.append(Statement("dead_bands_hardly_known", NOTE, numbers={"motors": unsure_names}))
     if names_without_start:
         numbers = {"motors": names_without_start, "too": bool(started_motors), "total": len(lines)}
         parts.append(Statement("motors_without_dead_band", NOTE, numbers=numbers))

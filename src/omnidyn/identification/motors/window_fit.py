@@ -18,9 +18,10 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InsufficientDataError
-from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, PAYS, SLOPE, WINDOWS, MotorEstimate
+from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, WINDOWS, MotorEstimate
 from omnidyn.identification.motors.log import follows
 from omnidyn.identification.motors.windows import MotorWindows
+from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 from omnidyn.statistics import (
     autocorrelation_time,
     central_interval,
@@ -31,7 +32,7 @@ from omnidyn.statistics import (
 )
 
 DRAWS, SEED, BLOCK = 1000, 20121, 3
-FOLDS = 5  # shares of the windows, in time, that are left out in turn
+FOLDS = 10  # shares of the windows, in time, that are left out in turn
 ITERATIONS, STEP_TOLERANCE = 200, 1e-8
 HUBER = 2.5
 MIDDLE = 0.6827  # of the draws: a few wild ones, of a line that is hardly determined, do not count in a std
@@ -63,9 +64,12 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
         numbers = dict(zip((SLOPE, BAND, INERTIA), draw_values.T, strict=True)) | {
             LAG: draw_values[:, 2] / draw_values[:, 0]
         }
-    is_needless = 1 in used_columns and not _pays(
-        design[:, used_columns], input_values, fit.weight, used_columns.index(1)
+    comparison = (
+        _of_held_out(design[:, used_columns], input_values, fit.weight, used_columns.index(1))
+        if 1 in used_columns
+        else None
     )
+    is_needless = comparison is not None and not comparison.is_better
     residual = input_values - design[:, used_columns] @ fit.parameters
     slope, error = float(fit.parameters[0]), float(np.sqrt(np.mean(residual**2)))
     with np.errstate(invalid="ignore", divide="ignore"):  # of draws that are all alike there is none
@@ -81,6 +85,7 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
         std={name: 0.5 * float(np.diff(central_interval(draws[1:], MIDDLE))[0]) for name, draws in numbers.items()},
         ci95={name: central_interval(draws[1:]) for name, draws in numbers.items()},
         rejected={BAND: central_interval(numbers[BAND][1:])} if is_needless else {},
+        comparisons={BAND: comparison} if comparison is not None and is_needless else {},
         correlation=correlation,
         rmse=error / abs(slope) if slope else math.inf,
         unidentifiable=tuple(name for name, draws in numbers.items() if np.isnan(draws[0])),
@@ -92,19 +97,19 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
     )
 
 
-def _pays(design: FloatArray, input_values: FloatArray, weight: FloatArray, column: int) -> bool:
-    """Whether windows left out, a share in turn, are predicted better with a column, by PAYS of the error."""
-    errors, fold = np.zeros(2), np.arange(len(input_values)) * FOLDS // len(input_values)
+def _of_held_out(design: FloatArray, input_values: FloatArray, weight: FloatArray, column: int) -> BlockComparison:
+    """How windows left out, a share in turn, are predicted with a column beside without."""
+    errors = np.zeros((2, FOLDS))
+    fold = np.arange(len(input_values)) * FOLDS // len(input_values)
     for k, table in enumerate((design, np.delete(design, column, axis=1))):
         root = np.sqrt(weight)
         for part in range(FOLDS):
             kept_rows, left_out_rows = fold != part, fold == part
             rows = root[kept_rows, None] * table[kept_rows]
             parameters = np.linalg.lstsq(rows, root[kept_rows] * input_values[kept_rows], rcond=None)[0]
-            errors[k] += float(
-                weight[left_out_rows] @ (input_values[left_out_rows] - table[left_out_rows] @ parameters) ** 2
-            )
-    return bool(np.sqrt(errors[0]) < (1.0 - PAYS) * np.sqrt(errors[1]))
+            left_out = input_values[left_out_rows] - table[left_out_rows] @ parameters
+            errors[k, part] = weight[left_out_rows] @ left_out**2 if left_out_rows.any() else np.nan
+    return compare_blocks(errors[1], errors[0])
 
 
 @dataclass(frozen=True, eq=False)

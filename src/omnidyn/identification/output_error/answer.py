@@ -8,6 +8,7 @@ from typing import Any
 
 from omnidyn.document import Part, Points, interval_cell, plain, sentence
 from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate, HeldOut
+from omnidyn.identification.lack_of_fit import LackOfFit
 from omnidyn.identification.ladder import Ladder
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.cures import Blind
@@ -90,6 +91,14 @@ class OutputErrorEstimate(Estimate):
         """How well free runs predict blocks of the logs: of this robot, of a plain fit and of the robot as it was
         given. None of a speed loop, of a fit by Student's t, of several groups, and after an interrupt."""
         return self.reference()
+
+    @property
+    def lack_of_fit(self) -> LackOfFit | None:
+        """Whether the residuals hold more than noise, what would explain it, and what free runs miss."""
+        lack = super().lack_of_fit
+        if lack is None or not lack.found or self.held_out is None:
+            return lack
+        return replace(lack, missed=self.held_out.written)
 
     @property
     def blind(self) -> tuple[Statement, ...]:

@@ -22,7 +22,7 @@ from omnidyn.identification.output_error.engines.engine import late_by
 from omnidyn.identification.output_error.problem.friction_laws import coulomb_below, falls
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, TRAVELS, implausible
 from omnidyn.identification.output_error.problem.parameters import Parameter
-from omnidyn.identification.output_error.problem.problem import Column, Fitted, Problem, per_column
+from omnidyn.identification.output_error.problem.problem import Column, FitProblem, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.solve.steps import Order
@@ -182,7 +182,7 @@ def unexplained(solver: Solver, solution: Solution) -> dict[str, float]:
     return unexplained_shares
 
 
-def _measured(problem: Fitted, column: Column) -> list[FloatArray]:
+def _measured(problem: FitProblem, column: Column) -> list[FloatArray]:
     """What was measured of a column, piece by piece; of what adds up, from its mean."""
     pieces = [piece for piece in problem.pieces if column in piece.record.columns]
     parts = [piece.record.outputs[piece.first : piece.last + 1, piece.record.columns.index(column)] for piece in pieces]
@@ -247,7 +247,7 @@ def noise_of(solver: Solver, solution: Solution) -> dict[str, float]:
 
 
 def intervals(
-    problem: Fitted, values: FloatArray, uncertainty: Trust
+    problem: FitProblem, values: FloatArray, uncertainty: Trust
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
     """Standard errors and 95 % intervals, on the scale on which the solver works; at a bound as for a friction line.
 

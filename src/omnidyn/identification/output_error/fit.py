@@ -19,14 +19,6 @@ from omnidyn.identification.grouping import count_once
 from omnidyn.identification.methods import AUTO, OutputError, degrees
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import ALL_LOGS, begun, group_names
-from omnidyn.identification.output_error.choice import (
-    SCREENING_STEPS,
-    beside_given,
-    best_with_force,
-    better_of,
-    screened,
-    why_white,
-)
 from omnidyn.identification.output_error.conclusion import conclude, loss_words, unexplained
 from omnidyn.identification.output_error.joint import join, joint_start, own_names
 from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
@@ -58,6 +50,14 @@ from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import beside, differences, refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, too_early
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, Trust, trust
+from omnidyn.identification.output_error.written_fit import (
+    SCREENING_STEPS,
+    beside_given,
+    best_with_force,
+    better_of,
+    screened,
+    why_white,
+)
 from omnidyn.model.actuation import GAIN
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
@@ -306,13 +306,17 @@ class Fit:
             kept_names = supported(
                 solution.solver, solution, (LATENCY,) if group.engine.has_loop else automatic(group.records)
             )
-        rejected_names = rejected_nuisances(solution) if not group.engine.has_loop else ()
-        kept_names = tuple(name for name in kept_names if name not in rejected_names)
+        rejected = rejected_nuisances(solution) if not group.engine.has_loop else {}
+        kept_names = tuple(name for name in kept_names if name not in rejected)
         lost = [name for name in solution.solver.problem.nuisances if name not in kept_names]
         if not lost:
             return self._chosen(solution, progress)
         notes = tuple(implausible(name, value, fitted=False) for name, value in early.items())
-        notes += tuple(Statement("harmful_nuisance", WARNING, name) for name in rejected_names if name not in early)
+        notes += tuple(
+            Statement("harmful_nuisance", WARNING, name, comparison.counts)
+            for name, comparison in rejected.items()
+            if name not in early
+        )
         if group.engine.has_loop:  # from its start on: until it is done, the fit with all of them is the best so far
             progress = progress.aside(f"once more without {', '.join(lost)}")
         simpler_solution = self._solve(group, group.problem(kept_names), progress, solution)

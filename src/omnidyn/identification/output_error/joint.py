@@ -10,7 +10,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
-from omnidyn.identification.output_error.engines.engine import Engine, Weighting
+from omnidyn.identification.output_error.engines.engine import FitEngine, Weighting
 from omnidyn.identification.output_error.prepare import FINE_TOLERANCE, Group
 from omnidyn.identification.output_error.problem.parameters import AT, Parameter
 from omnidyn.identification.output_error.problem.problem import Parts, PieceSums, Point, Problem
@@ -30,7 +30,7 @@ class Member:
 
     group: Group
     problem: Problem
-    engine: Engine[Problem]
+    engine: FitEngine[Problem]
     at: IntArray
     places: IntArray
 
@@ -95,7 +95,7 @@ class Member:
         }
 
 
-class JointEngine(Engine[Problem]):
+class JointEngine(FitEngine[Problem]):
     """The engines of all groups as one: the sums of each piece, put where its parameters stand among all."""
 
     def __init__(self, problem: Problem, members: Sequence[Member]):
@@ -200,7 +200,7 @@ def join(
 
 
 def joint_start(
-    engine: Engine[Problem], nu: float, progress: FitProgress, states_by_group: Mapping[str, State] | None = None
+    engine: FitEngine[Problem], nu: float, progress: FitProgress, states_by_group: Mapping[str, State] | None = None
 ) -> Point:
     """Each group begins where it would alone, or where `states_by_group` says; shared numbers at the median of the
     groups."""

@@ -11,10 +11,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.engines.engine import Engine
-from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
+from omnidyn.identification.output_error.engines.kinds import Kind, kind_with
 from omnidyn.identification.output_error.problem.differences import differences
 from omnidyn.identification.output_error.problem.friction_laws import BANDS, falls, kept_in_order
 from omnidyn.identification.output_error.problem.nuisances import (
@@ -63,7 +60,6 @@ from omnidyn.simulation.slip.plant import grips
 from omnidyn.statement import WARNING, Statement
 from omnidyn.statistics import difference_noise
 
-Kind = type[Engine[Problem]]  # of an engine
 FINE_TOLERANCE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
 PROBE_CHANGE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
 DRIVE_FACTOR = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
@@ -130,8 +126,9 @@ def make_group(
     axis_motion = motion(records, robot)
     if looped(records):
         question = _loop_question(question, axis_motion, records, robot)
-        return Group(name, records, robot, question, LoopEngine, default_keys, axis_motion.moving_axes, {}, ())
-    engine, bounds, warnings = ExactEngine if exact else ImplicitEngine, {}, []
+        engine = kind_with(has_loop=True)
+        return Group(name, records, robot, question, engine, default_keys, axis_motion.moving_axes, {}, ())
+    engine, bounds, warnings = kind_with(exact=exact), {}, []
     free_keys = question.free if question.free is not None else (*dict.fromkeys((*default_keys, *guesses(robot))),)
     fixed = set(question.fixed)
     for axis in np.flatnonzero(~axis_motion.moving_axes).tolist():
@@ -153,7 +150,7 @@ def make_group(
     return Group(name, records, robot, question, engine, default_keys, axis_motion.moving_axes, bounds, tuple(warnings))
 
 
-def _never_moved(axis_motion: Motion, source: str) -> InsufficientDataError:
+def _never_moved(axis_motion: MovedAxes, source: str) -> InsufficientDataError:
     return InsufficientDataError(
         "the robot never visibly moved: its friction is only bounded from below",
         got="; ".join(
@@ -168,7 +165,9 @@ def _never_moved(axis_motion: Motion, source: str) -> InsufficientDataError:
     )
 
 
-def _loop_question(question: OutputError, axis_motion: Motion, records: Sequence[Record], robot: Robot) -> OutputError:
+def _loop_question(
+    question: OutputError, axis_motion: MovedAxes, records: Sequence[Record], robot: Robot
+) -> OutputError:
     """By default friction of what moved, guesses and gains. Raises InsufficientDataError where nothing moved."""
     still_axes = np.flatnonzero(~axis_motion.moving_axes).tolist()
     guessed_keys = [key for key in guesses(robot, has_loop=True) if Key.parse(key).axis not in still_axes]
@@ -249,9 +248,7 @@ def make_problem(
 
 def engine_for(records: Sequence[Record], robot: Robot, keys: Sequence[str]) -> Kind:
     """Which engine fits these keys of the robot to the records."""
-    if looped(records):
-        return LoopEngine
-    return ExactEngine if is_exact(robot) and stays_exact(robot, keys) else ImplicitEngine
+    return kind_with(has_loop=looped(records), exact=is_exact(robot) and stays_exact(robot, keys))
 
 
 def stays_exact(robot: Robot, keys: Sequence[str]) -> bool:
@@ -329,7 +326,7 @@ MOTION_ERRORS = 6.0  # standard errors of a short mean that noise does not reach
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class MovedAxes:
     """moving_axes (3,): whether an axis visibly moved; True where no twist is known.
 
     held_forces (3,): largest drive [N, N, N m] of the axes that were measured; 0 where all have moved, and nothing was
@@ -352,14 +349,14 @@ class Motion:
         return Statement("axis_not_moved", WARNING, AXES[axis], {"held": held_force, "dead": bool(self.dead[axis])})
 
 
-def motion(records: Sequence[Record], robot: Robot) -> Motion:
+def motion(records: Sequence[Record], robot: Robot) -> MovedAxes:
     """What all logs together show."""
     moving_axes, seen_axes, still_axes = np.zeros(3, bool), np.zeros(3, bool), np.ones(3, bool)
     measured = []
     for log in records:
         twist = measured_twist(log, robot)
         if twist is None:
-            return Motion(np.ones(3, bool), np.zeros(3), np.ones(3, bool), np.zeros(3, bool))
+            return MovedAxes(np.ones(3, bool), np.zeros(3), np.ones(3, bool), np.zeros(3, bool))
         measured_axes = np.array([np.isfinite(twist[:, axis]).any() for axis in range(3)])
         measured.append(measured_axes)
         has_other_columns = any(name != "twist" for name, _ in log.columns)  # which may tell of an axis without a speed
@@ -373,7 +370,7 @@ def motion(records: Sequence[Record], robot: Robot) -> Motion:
             for axis in np.flatnonzero(measured_axes).tolist():
                 moving_axes[axis] |= _moved(twist, axis, first, last, rows)
     held_forces = np.zeros(3) if moving_axes.all() else _most_drive(records, measured, robot)
-    return Motion(moving_axes, held_forces, seen_axes, still_axes & bool(moving_axes.any()))
+    return MovedAxes(moving_axes, held_forces, seen_axes, still_axes & bool(moving_axes.any()))
 
 
 def _most_drive(records: Sequence[Record], measured: Sequence[BoolArray], robot: Robot) -> FloatArray:

@@ -1,10 +1,9 @@
 """Which shape has the least error on directions it has not seen, and which the data cannot tell apart from it.
 
-Shapes are compared by the root mean square of the left-out error of the full force vector. A difference is that of the
-squared errors at the same points, so what all shapes share drops out; its standard error counts that neighbouring
-directions err alike. Of the shapes that cannot be told from the best (within two standard errors of the difference, and
-of the best's own error), the one with the fewest levels is taken, much as with the one-standard-error rule of Breiman
-et al., Classification and Regression Trees (1984), section 3.4.3.
+Shapes are listed by the root mean square of the left-out error of the full force vector. Two are compared by blocks of
+neighbouring directions, which err alike (`compare_blocks`). Of the shapes that these do not clearly tell from the best,
+the one with the fewest levels is taken: the one-standard-error rule of Breiman et al., Classification and Regression
+Trees (1984), section 3.4.3.
 
 What decides is robust where the fits are: beyond two scales of the shape that has the least, an error counts by its
 length (Huber's loss), not by its square. A wheel at rest holds any force up to its level, which no shape foretells: by
@@ -13,7 +12,6 @@ squares, the four directions of 24 in which a wheel of the axebot rests decide a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -21,6 +19,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 from omnidyn.identification.steady.operating_points import CURRENT, ForcePoints
 from omnidyn.identification.steady.shapes import (
     HUBER,
@@ -36,7 +35,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.statistics import huber_loss
 
 AUTO = "auto"
-SHAPE_ERRORS = 2.0  # standard errors from which two shapes are told apart
+BLOCKS = 18  # of neighbouring directions, of each group, at most
 NOT_COMPARED = {
     "one_speed": "the points of a group have nearly one speed",
     "not_determined": "the directions do not determine all of its levels",
@@ -50,9 +49,9 @@ class ShapeScore:
 
     levels: how many numbers it has, per group. loo, loo_std: left-out error of the full force vector and its standard
     error. along, along_std: the same along travel. behind, behind_std: how much more than the best shape, and the
-    standard error of that difference. apart: the same in standard errors, by what decides. told_apart: whether the data
-    tell it from the best. in_model: whether a robot
-    file can hold it. at_bound: a level came out negative, so it adds nothing real.
+    standard error of that difference. apart: the same of blocks of directions, in standard errors. told_apart: whether
+    the data tell it from the best. in_model: whether a robot file can hold it. at_bound: a level came out negative, so
+    it adds nothing real.
     """
 
     name: str
@@ -158,7 +157,7 @@ def _of_groups(
             errors = _LeftOutErrors(fits_of_group[group], robust)
             scores_by_group[group] = _scores(fits_of_group[group], errors)
             usable_names = [score.name for score in scores_by_group[group] if score.in_model and not score.at_bound]
-            if usable_names and errors.apart(shared_shape, usable_names[0]) > SHAPE_ERRORS:
+            if usable_names and errors.comparison(shared_shape, usable_names[0]).is_clear:
                 new_shapes[group] = _choice(scores_by_group[group], errors)
         if not new_shapes:
             break
@@ -192,7 +191,7 @@ def speeds_differ(points: ForcePoints) -> bool:
 
 
 class _LeftOutErrors:
-    """What decides between shapes. squares: shape -> squared left-out errors; fold: of each point."""
+    """What decides between shapes. squares: shape -> squared left-out errors; fold: of each point; block: the same."""
 
     def __init__(self, fits: Mapping[str, Mapping[str, ShapeFit]], robust: bool):
         self.squares = {
@@ -200,8 +199,7 @@ class _LeftOutErrors:
             for name, groups in fits.items()
         }
         folds = [fit.fold for fit in next(iter(fits.values())).values()]
-        first_folds = np.cumsum([0, *(int(fold.max()) + 1 for fold in folds)])
-        self.fold = np.concatenate([fold + first for fold, first in zip(folds, first_folds[:-1], strict=True)])
+        self.fold, self.block = _numbered(folds), _numbered([blocks_of(fold) for fold in folds])
         self._loss = self.squares
         if robust:  # Huber's loss, its bound two scales of the shape that has the least
             limit = HUBER / RAYLEIGH * float(np.sqrt(min(np.median(square) for square in self.squares.values())))
@@ -212,13 +210,21 @@ class _LeftOutErrors:
         """The shapes, best first."""
         return sorted(self._loss, key=lambda name: float(np.mean(self._loss[name])))
 
-    def apart(self, name: str, best: str) -> float:
-        """How much worse than the best, in standard errors: of the difference or of the best's own, the smaller."""
-        difference, error = _difference(self._loss[name], self._loss[best], self.fold)
-        error = min(error, rms_and_error(self._loss[best], self.fold)[1])
-        if not difference or math.isnan(error):
-            return 0.0
-        return difference / error if error > 0.0 else math.copysign(math.inf, difference)
+    def comparison(self, name: str, best: str) -> BlockComparison:
+        """How the best predicts blocks of directions beside another shape."""
+        return compare_blocks(*(np.bincount(self.block, self._loss[shape]).astype(float) for shape in (name, best)))
+
+
+def blocks_of(fold: IntArray) -> IntArray:
+    """The block of each point: neighbouring directions, by the folds in which they are left out."""
+    count = int(fold.max()) + 1
+    return fold * min(count, BLOCKS) // count
+
+
+def _numbered(parts: Sequence[IntArray]) -> IntArray:
+    """The numbers of several groups, each from 0 on, one after the other."""
+    first = np.cumsum([0, *(int(part.max()) + 1 for part in parts)])
+    return np.concatenate([part + start for part, start in zip(parts, first[:-1], strict=True)])
 
 
 def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], errors: _LeftOutErrors) -> tuple[ShapeScore, ...]:
@@ -228,7 +234,7 @@ def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], errors: _LeftOutErrors) 
     squares, fold, order = errors.squares, errors.fold, errors.order
     scores = []
     for name in order:
-        distance = errors.apart(name, order[0])
+        comparison = errors.comparison(name, order[0])
         groups = list(fits[name].values())
         scores.append(
             ShapeScore(
@@ -238,8 +244,8 @@ def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], errors: _LeftOutErrors) 
                 *rms_and_error(squares[name], fold),
                 *rms_and_error(squares_by_shape[name], fold),
                 *_difference(squares[name], squares[order[0]], fold),
-                distance,
-                distance > SHAPE_ERRORS,
+                comparison.t,
+                comparison.is_clear,
                 SHAPES[name].in_model,
                 any((fit.free <= 0.0).any() for fit in groups),
             )
@@ -265,7 +271,8 @@ def _choice(scores: Sequence[ShapeScore], errors: _LeftOutErrors) -> str:
             expected="forces that point along the motion",
             remedy="check the sign of the currents, and which wheel is which",
         )
-    equal = [score for score in usable_scores if errors.apart(score.name, usable_scores[0].name) <= SHAPE_ERRORS]
+    best = usable_scores[0].name
+    equal = [score for score in usable_scores if not errors.comparison(score.name, best).is_clear]
     return min(equal, key=lambda score: (score.levels, score.loo)).name
 
 

@@ -18,7 +18,8 @@ from scipy.special import fdtrc, stdtr
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Force, LackOfFit, Remedy
-from omnidyn.identification.steady.choice import SHAPE_ERRORS
+from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
+from omnidyn.identification.steady.choice import blocks_of
 from omnidyn.identification.steady.operating_points import ForcePoints
 from omnidyn.identification.steady.shapes import (
     HUBER,
@@ -70,7 +71,12 @@ def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
     size = float(np.sqrt(np.mean((problem.target**2).sum(axis=1))))
     tests = sum(key_fit.new for key_fit in fit_by_key.values()) + 1
     forces = {key: _gain(key_fit, plain_fit, problem.fold, tests) for key, key_fit in fit_by_key.items()}
-    better_keys = sorted((key for key in forces if _matters(forces[key], size)), key=lambda key: forces[key].after)
+    plain_loss = _of_blocks(plain_fit, problem.fold)
+    comparisons = {key: compare_blocks(plain_loss, _of_blocks(fit, problem.fold)) for key, fit in fit_by_key.items()}
+    better_keys = sorted(
+        (key for key, force in forces.items() if _matters(force, comparisons[key], size)),
+        key=lambda key: forces[key].after,
+    )
     repeat_test = _repeated(plain_fit, problem, len(fit.keys))
     is_lacking = bool(better_keys) or (
         repeat_test.probability * tests < FALSE_ALARM and repeat_test.size > FORCE_SHARE * size
@@ -83,19 +89,24 @@ def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
         {"force": share},
         {"force": max((forces[key].size for key in better_keys), default=0.0)},
         (),
-        tuple(_remedy(key, forces, better_keys) for key in better_keys),
+        tuple(_remedy(key, forces, comparisons[key], better_keys) for key in better_keys),
         {},
         tried=(*fit_by_key, *([REPEATS] if repeat_test.is_tested else [])),
     )
 
 
-def _matters(force: Force, size: float) -> bool:
+def _matters(force: Force, comparison: BlockComparison, size: float) -> bool:
     """Whether a gain is no chance, tells more of what was left out, and is large. size [N]: rms of all forces."""
-    return force.p < FALSE_ALARM and force.gain > SHAPE_ERRORS * force.gain_std and force.size > FORCE_SHARE * size
+    return force.p < FALSE_ALARM and comparison.is_better and force.size > FORCE_SHARE * size
 
 
-def _remedy(key: str, forces: Mapping[str, Force], better_keys: Sequence[str]) -> Remedy:
-    """The best names those which do as well: their left-out error is within a standard error of its gain."""
+def _of_blocks(fit: _Solved, fold: IntArray) -> FloatArray:
+    """The sum of squared errors of each block of directions that was left out."""
+    return np.bincount(blocks_of(fold), (fit.error**2).sum(axis=1)).astype(float)
+
+
+def _remedy(key: str, forces: Mapping[str, Force], comparison: BlockComparison, better_keys: Sequence[str]) -> Remedy:
+    """The best names those which do nearly as well: their left-out error is within a standard error of its gain."""
     force, best = forces[key], forces[better_keys[0]]
     similar_keys = [rival_key for rival_key in better_keys[1:] if forces[rival_key].after - best.after <= best.gain_std]
     square_before, square_after = force.before**2, force.after**2
@@ -107,6 +118,7 @@ def _remedy(key: str, forces: Mapping[str, Force], better_keys: Sequence[str]) -
         tuple(similar_keys) if force is best else (),
         offered=False,
         force=force,
+        comparison=comparison,
     )
 
 

@@ -1,11 +1,12 @@
 """A change inside a run at constant speeds, of floor, load or supply, by commands that come again.
 
-    y_k = a_c + d [t_k > T] + noise,   y: force of piece k along the mean force of its command c and across it, over
-                                       that mean; a held command is cut in pieces of half a second
+    y_k = a_c + d x_k + noise,   y: force of piece k along the mean force of its command c, over that mean; a held
+                                 command is cut in pieces of half a second
+    x: 0 before the change, 1 after it, and a line between: wheels cross the edge of a floor one by one
 
-A command is compared with itself, so that no shape of friction has a part in it. T is the cut between two pieces that
-explains most; Hotelling's T squared of d, over the memory of what is left, counts all cuts of a run (C. E. Bonferroni,
-1936). A slow drift that explains as much is no step.
+A command is compared with itself, so that no shape of friction has a part in it. The change lies where it explains
+most; Student's t of d, without the pieces of the crossing, counts the memory of what is left. A motor that warms up
+may explain as much: a line in time, or an exponential. Then it is no change.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
-from scipy.special import fdtrc, stdtr
+from scipy.special import stdtr
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.steady.lack_of_fit import LinearShape, all_moving, unoffered_columns
@@ -25,11 +26,15 @@ from omnidyn.run import Run
 from omnidyn.statement import Statement
 from omnidyn.statistics import autocorrelation_time, huber_weight, t_quantile
 
-FALSE_SHARE = 0.002  # of right runs for which a change is told where commands come again; by the shape, of right logs:
-FALSE_BY_SHAPE = 0.01
+CHANCE = 0.0002  # of as much at the likeliest cut: 2 of 100 runs over one floor are said to change (bench floors)
+FALSE_BY_SHAPE = 0.01  # of right logs for which a change is told by the shape
+MOST_CROSSING, CROSSING_SHARE = 6, 5  # pieces of a crossing at most, and of the run one part in so many
+MOST_CUTS = 200  # of a long run
+DRIFT_MARGIN = 5.0  # of the log-likelihood ratio, by which a drift must be worse
+SETTLING = (0.1, 0.2, 0.35, 0.6)  # of the run: time constants of a drift
 SPARE_DEGREES = 4  # degrees of freedom that a test needs
 LEAST_PIECES = 3  # pieces, or windows, on either side of a cut
-RIVAL_MARGIN = 6.0  # of t squared, by which another cut, or a drift, must be worse than the best to be ruled out
+RIVAL_MARGIN = 6.0  # of t squared, by which another cut must be worse than the best to be ruled out
 FORCE_SHARE = 0.02  # of the force: a smaller change does not matter
 
 
@@ -112,67 +117,68 @@ def _cuts(held_pieces: HeldForces) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class _Shift:
-    """d of a cut and its standard error, along the force and across it (2,). size: Hotelling's T squared; degrees: of
-    freedom, both with the memory of what is left. residual (n, 2): what is left."""
+    """d, its standard error and degrees of freedom with the memory of what is left, in pieces. is_before, is_after
+    (n,): the pieces on either side of the crossing."""
 
-    value: FloatArray
-    std: FloatArray
-    size: float
+    value: float
+    std: float
     degrees: float
-    residual: FloatArray
+    memory: float
+    is_before: BoolArray
+    is_after: BoolArray
 
     @property
     def chance(self) -> float:
-        """Of as much by noise alone: F = T^2 (m - 1) / (2 m) with 2 and m - 1 degrees of freedom."""
-        if self.degrees < SPARE_DEGREES:
-            return 1.0
-        return float(fdtrc(2.0, self.degrees - 1.0, self.size * (self.degrees - 1.0) / (2.0 * self.degrees)))
+        """Of as much by noise alone."""
+        return 2.0 * float(stdtr(self.degrees, -abs(self.value) / self.std))
 
 
 def _moment(held_pieces: HeldForces, cuts: Sequence[int], source: str) -> Moment | None:
     y, size = _along(held_pieces)
-    shift_by_cut = {cut: _shift(y, held_pieces.command, cut) for cut in cuts}
-    best = max(cuts, key=lambda cut: shift_by_cut[cut].size)
-    shift = shift_by_cut[best]
-    memory = max(autocorrelation_time(column) for column in shift.residual.T)
-    shift = replace(shift, std=shift.std * np.sqrt(memory), size=shift.size / memory, degrees=shift.degrees / memory)
-    p = min(1.0, len(cuts) * shift.chance)
-    if p > FALSE_SHARE or abs(shift.value[0]) < FORCE_SHARE or _drifts(y, held_pieces, shift):
-        return None
-    near_cuts = [cut for cut in cuts if shift_by_cut[cut].size / memory > shift.size - RIVAL_MARGIN]
-    common_commands = np.isin(
-        held_pieces.command, np.intersect1d(held_pieces.command[:best], held_pieces.command[best:])
+    n, command = len(y), held_pieces.command
+    widths = range(min(MOST_CROSSING, n // CROSSING_SHARE) + 1)
+    kept_cuts = cuts[:: -(-len(cuts) // MOST_CUTS)]
+    crossings = np.array(
+        [(cut, cut + width) for width in widths for cut in kept_cuts if cut + width <= n - LEAST_PIECES]
     )
-    pieces_after = np.arange(len(y)) >= best
+    squares = _squares(y, command, crossings)
+    best = int(np.argmin(squares))
+    first, last = crossings[best].tolist()
+    shift = _shift(y, command, first, last)
+    if shift is None or shift.chance > CHANCE or abs(shift.value) < FORCE_SHARE:
+        return None
+    independent_pieces = n / shift.memory
+    if independent_pieces * np.log(_drift_squares(y, held_pieces) / squares[best]) < DRIFT_MARGIN:
+        return None
+    near_cuts = crossings[independent_pieces * np.log(squares / squares[best]) < RIVAL_MARGIN]
+    common_commands = np.isin(command, np.intersect1d(command[shift.is_before], command[shift.is_after]))
     force = float(size[common_commands].mean())
     spread = t_quantile(shift.degrees)
-    value, std = float(shift.value[0]), float(shift.std[0])
-    scatter = std * np.sqrt(len(y)) / 2.0  # of one piece, over the force
+    scatter = shift.std * np.sqrt(
+        shift.is_before.sum() * shift.is_after.sum() / (shift.is_before | shift.is_after).sum()
+    )
 
     def level(rows: BoolArray) -> tuple[float, tuple[float, float]]:
-        middle, half = force * float(y[rows, 0].mean()), float(spread * force * scatter / np.sqrt(rows.sum()))
+        middle, half = force * float(y[rows].mean()), float(spread * force * scatter / np.sqrt(rows.sum()))
         return middle, (middle - half, middle + half)
 
-    ends = (float(held_pieces.span[min(near_cuts) - 1, 0]), float(held_pieces.span[max(near_cuts), 1]))
-    time = 0.5 * float(held_pieces.span[best - 1, 1] + held_pieces.span[best, 0])
-    level_before, level_after = level(common_commands & ~pieces_after), level(common_commands & pieces_after)
+    ends = (float(held_pieces.span[near_cuts[:, 0].min() - 1, 0]), float(held_pieces.span[near_cuts[:, 1].max(), 1]))
+    time = 0.5 * float(held_pieces.span[first - 1, 1] + held_pieces.span[last, 0])
+    level_before, level_after = (level(common_commands & side) for side in (shift.is_before, shift.is_after))
     base = level_before[0] / force
-    ci95 = ((value - spread * std) / base, (value + spread * std) / base)
-    return Moment(source, time, ends, *level_before, *level_after, value / base, ci95, p)
+    ci95 = ((shift.value - spread * shift.std) / base, (shift.value + spread * shift.std) / base)
+    p = min(1.0, len(cuts) * shift.chance)
+    return Moment(source, time, ends, *level_before, *level_after, shift.value / base, ci95, p)
 
 
 def _along(held_pieces: HeldForces) -> tuple[FloatArray, FloatArray]:
-    """(force of each piece along the mean of its command and across it, over that mean (n, 2); the mean [N] (n,))."""
-    y, size = np.zeros(held_pieces.force.shape), np.zeros(len(held_pieces.force))
+    """(force of each piece along the mean of its command, over that mean (n,); the mean [N] (n,))."""
+    y, size = np.zeros(len(held_pieces.force)), np.zeros(len(held_pieces.force))
     for c in np.unique(held_pieces.command):
         rows = held_pieces.command == c
-        x, across_force = mean = held_pieces.force[rows].mean(axis=0)
+        mean = held_pieces.force[rows].mean(axis=0)
         size[rows] = np.linalg.norm(mean)
-        y[rows] = (
-            held_pieces.force[rows]
-            @ np.array([[x, -across_force], [across_force, x]])
-            / max(float(mean @ mean), 1e-300)
-        )
+        y[rows] = held_pieces.force[rows] @ mean / max(float(mean @ mean), 1e-300)
     return y, size
 
 
@@ -184,28 +190,46 @@ def _without_commands(values: FloatArray, command: IntArray) -> FloatArray:
     return remaining
 
 
-def _shift(y: FloatArray, command: IntArray, cut: int) -> _Shift:
-    """The step at a cut, each command with a mean of its own; without memory."""
-    x = _without_commands((np.arange(len(y)) >= cut).astype(float), command)
+def _squares(y: FloatArray, command: IntArray, crossings: IntArray) -> FloatArray:
+    """What each crossing (m, 2), from its first piece to the one after its last, leaves of the squares. Shape (m,)."""
+    first, last = crossings.T
+    ramps = np.clip((np.arange(len(y))[:, None] - first + 1.0) / (last - first + 1.0), 0.0, 1.0)
+    return _left_by(y, _without_commands(ramps, command), command)
+
+
+def _drift_squares(y: FloatArray, held_pieces: HeldForces) -> float:
+    """What the likeliest drift of a motor that warms up leaves of the squares."""
+    t = held_pieces.span.mean(axis=1) - held_pieces.span[0, 0]
+    courses = np.stack([t / t[-1], *(np.exp(-t / (share * t[-1])) for share in SETTLING)], axis=1)
+    return float(_left_by(y, _without_commands(courses, held_pieces.command), held_pieces.command).min())
+
+
+def _left_by(y: FloatArray, columns: FloatArray, command: IntArray) -> FloatArray:
+    """The squares that are left beside each column (n, m) by itself, each command with a mean of its own: (m,)."""
     remaining = _without_commands(y, command)
+    size = np.maximum((columns**2).sum(axis=0), 1e-300)
+    return np.maximum(float(remaining @ remaining) - (columns.T @ remaining) ** 2 / size, 1e-300)
+
+
+def _shift(y: FloatArray, command: IntArray, first: int, last: int) -> _Shift | None:
+    """The step from before piece `first` to piece `last` and after; None where too few pieces tell."""
+    piece = np.arange(len(y))
+    is_before, is_after = piece < first, piece >= last
+    sides = is_before | is_after
+    x = _without_commands(is_after[sides].astype(float), command[sides])
+    remaining = _without_commands(y[sides], command[sides])
     square = float(x @ x)
-    value = x @ remaining / square
-    rest_of_shift = remaining - x[:, None] * value
-    degrees = len(y) - len(np.unique(command)) - 1
-    covariance = rest_of_shift.T @ rest_of_shift / degrees / square
-    covariance += np.eye(2) * max(1e-9 * float(np.trace(covariance)), 1e-300)  # of a log without noise
-    size = float(value @ np.linalg.solve(covariance, value))
-    return _Shift(value, np.sqrt(np.diag(covariance)), size, degrees, rest_of_shift)
-
-
-def _drifts(y: FloatArray, held_pieces: HeldForces, shift: _Shift) -> bool:
-    """Whether a slow drift, a parabola in time, is nearly as likely as a step, which has as many free numbers."""
-    t = held_pieces.span.mean(axis=1) - held_pieces.span.mean()
-    slow = _without_commands(np.stack([t, t**2], axis=1), held_pieces.command)
-    remaining = _without_commands(y, held_pieces.command)
-    drift = remaining - slow @ np.linalg.lstsq(slow, remaining, rcond=None)[0]
-    (_, by_step), (_, by_drift) = (np.linalg.slogdet(residual.T @ residual) for residual in (shift.residual, drift))
-    return bool(shift.degrees * (by_drift - by_step) < RIVAL_MARGIN)
+    degrees = len(x) - len(np.unique(command[sides])) - 1
+    if square < 1e-9 or degrees < SPARE_DEGREES:
+        return None
+    value = float(x @ remaining) / square
+    residual = remaining - x * value
+    memory = autocorrelation_time(residual)
+    memory *= 1.0 + (2.0 * memory + 1.0) / len(x)  # a step that is fitted hides a part of it
+    if degrees / memory < SPARE_DEGREES:
+        return None
+    std = float(np.sqrt(max(float(residual @ residual), 1e-300) / degrees / square * memory))
+    return _Shift(value, std, degrees / memory, memory, is_before, is_after)
 
 
 # A change inside a run where no command comes again: the fitted shape of friction is the yardstick

@@ -12,8 +12,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import small_matrices
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
-from omnidyn.identification.output_error.linear.motion import motions
-from omnidyn.identification.output_error.linear.rows import Linear, Rows, solved
+from omnidyn.identification.output_error.linear.driven_motion import motions
+from omnidyn.identification.output_error.linear.rows import FitRows, Linear, solved
 from omnidyn.identification.output_error.linear.sensitivity import effects, with_rounding
 from omnidyn.identification.output_error.linear.workbench import Workbench, scaled
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
@@ -68,7 +68,7 @@ def examine(solution: Solution) -> Examined:
     engine = solver.engine.on(decimated.all_rows(problem))
     parts = decimated.kept(engine.residuals(point))
     piece_motions = motions(problem, point)
-    rows = with_rounding(Rows.of(problem, point, as_counted(solution, problem, parts)), piece_motions)
+    rows = with_rounding(FitRows.of(problem, point, as_counted(solution, problem, parts)), piece_motions)
     misfit_result = misfit(rows, piece_motions)
     stable = stability(misfit_result.linear)
     bench = Workbench(problem, point, type(engine), piece_motions, stable.likely)
@@ -175,7 +175,7 @@ def with_levels(problem: Problem, point: Point, levels: dict[str, float]) -> Pro
     return replace(problem, robot=holding(problem.robot_at(point.values), levels)) if levels else problem
 
 
-def _sizes(rows: Rows, channels: Mapping[str, float]) -> dict[str, float]:
+def _sizes(rows: FitRows, channels: Mapping[str, float]) -> dict[str, float]:
     """How large a share of the residual of each column is, root mean square."""
     mean = rows.squares(rows.residual) / np.maximum(rows.added(lambda k, j: rows.masks[k][j]), 1.0)
     return dict(zip(channels, np.sqrt(np.array([*channels.values()]) * mean).tolist(), strict=True))

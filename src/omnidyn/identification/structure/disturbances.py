@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.output_error.linear.motion import Motion, in_the_room
+from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion, in_the_room
 from omnidyn.model.layout import N_AXES, YAW
 
-Directions = Callable[[Motion, FloatArray], FloatArray]  # of a motion and its fastest twist (3,)
+Directions = Callable[[DrivenMotion, FloatArray], FloatArray]  # of a motion and its fastest twist (3,)
 Sensors = Sequence[tuple[str, int]]  # (channel, component) of all that the logs show
 
 
@@ -37,7 +37,7 @@ def _on_axes(values: list[tuple[int, FloatArray]]) -> FloatArray:
     return forces
 
 
-def _speed(motion: Motion, top: FloatArray) -> FloatArray:
+def _speed(motion: DrivenMotion, top: FloatArray) -> FloatArray:
     """Friction against the speed of each axis: beside the line, curves that fall or rise at any speed."""
     terms = []
     for axis in range(N_AXES):
@@ -47,14 +47,14 @@ def _speed(motion: Motion, top: FloatArray) -> FloatArray:
     return _on_axes(terms)
 
 
-def _one_way(motion: Motion, top: FloatArray) -> FloatArray:
+def _one_way(motion: DrivenMotion, top: FloatArray) -> FloatArray:
     """Forces that do not turn with the direction: a slope, more friction forwards than backwards."""
     shares = np.abs(motion.twist) / top
     sizes = np.ones_like(shares), (shares > 0.0).astype(float), shares
     return _on_axes([(axis, size[:, axis]) for axis in range(N_AXES) for size in sizes])
 
 
-def _travel(motion: Motion, top: FloatArray) -> FloatArray:
+def _travel(motion: DrivenMotion, top: FloatArray) -> FloatArray:
     """Friction along one axis that depends on the motion along the others."""
     x, y, w = (motion.twist / top).T
     size = np.hypot(motion.twist[:, 0], motion.twist[:, 1])
@@ -89,7 +89,7 @@ def _travel(motion: Motion, top: FloatArray) -> FloatArray:
     return _on_axes(terms)
 
 
-def _wheels(motion: Motion, top: FloatArray) -> FloatArray:
+def _wheels(motion: DrivenMotion, top: FloatArray) -> FloatArray:
     """Friction and drag of single wheels."""
     g = motion.robot.wheels.wrench_matrix
     rim = motion.twist @ g
@@ -97,14 +97,14 @@ def _wheels(motion: Motion, top: FloatArray) -> FloatArray:
     return at_rim[:, :, None] * np.concatenate([g, g], axis=1).T
 
 
-def _acceleration(motion: Motion, top: FloatArray) -> FloatArray:
+def _acceleration(motion: DrivenMotion, top: FloatArray) -> FloatArray:
     """Mass and inertia that are other than said, and the terms of a turning frame."""
     x, y, w = motion.twist.T
     terms = [(axis, motion.pace[:, source_axis]) for axis in range(N_AXES) for source_axis in range(N_AXES)]
     return _on_axes([*terms, (0, w * y), (1, w * x), (0, w**2), (1, w**2), (0, w * np.abs(w)), (1, w * np.abs(w))])
 
 
-def _inputs(motion: Motion, top: FloatArray) -> FloatArray:
+def _inputs(motion: DrivenMotion, top: FloatArray) -> FloatArray:
     """Motors and drivers that give more or less than said: each, by its voltage, its current and what all draw."""
     g, u, i = motion.robot.wheels.wrench_matrix, motion.voltage, motion.current
     voltage_limit, peak = (max(float(np.abs(values).max()), 1e-12) for values in (u, i))
@@ -127,7 +127,7 @@ def _inputs(motion: Motion, top: FloatArray) -> FloatArray:
     return np.concatenate([motor_forces, total_forces, _on_axes([(a, dry[:, a]) for a in range(N_AXES)])], axis=1)
 
 
-def _time(motion: Motion, top: FloatArray) -> FloatArray:
+def _time(motion: DrivenMotion, top: FloatArray) -> FloatArray:
     """What is not the same at the end of the log as at its start: friction, mass, supply."""
     tau = 2.0 * motion.share - 1.0
     shapes = tau, tau**2, np.sign(tau)
@@ -138,7 +138,7 @@ def _time(motion: Motion, top: FloatArray) -> FloatArray:
     return np.concatenate([_on_axes(friction), supply], axis=1)
 
 
-def _angles(motion: Motion, top: FloatArray) -> FloatArray:
+def _angles(motion: DrivenMotion, top: FloatArray) -> FloatArray:
     """What comes back with every turn of a wheel: an eccentric wheel, a bent axle, teeth. On force and on speed."""
     g = motion.robot.wheels.wrench_matrix
     return np.concatenate(
@@ -146,7 +146,7 @@ def _angles(motion: Motion, top: FloatArray) -> FloatArray:
     )
 
 
-def _sensors(motion: Motion, sensors: Sensors) -> FloatArray:
+def _sensors(motion: DrivenMotion, sensors: Sensors) -> FloatArray:
     """Sensors that show more or less, later or one-sided: each by itself, also one of other logs. Shape (C, n, K)."""
     speed, dt = motion.shown(motion.twist[:, None, :])[:, :, 0], np.diff(motion.t)
     columns = np.zeros((len(speed), len(motion.t), 4 * len(sensors)))
@@ -176,7 +176,7 @@ THEMES = (
 
 
 def shown_by_themes(
-    motion: Motion, top: FloatArray, sensors: Sensors, themes: Sequence[Theme] = THEMES
+    motion: DrivenMotion, top: FloatArray, sensors: Sensors, themes: Sequence[Theme] = THEMES
 ) -> tuple[FloatArray, list[int]]:
     """(what all directions of all themes show of a motion (C, n, K), how many of the K each theme has)."""
     forces = [theme.directions(motion, top) for theme in themes if theme.directions is not None]

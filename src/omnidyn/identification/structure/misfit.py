@@ -15,12 +15,12 @@ from scipy.special import fdtrc
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Found
-from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion
 from omnidyn.identification.output_error.linear.rows import (
     EIGEN_TOLERANCE,
     TINY,
+    FitRows,
     Linear,
-    Rows,
     Shown,
     lengths,
     noise_models,
@@ -59,7 +59,7 @@ class Misfit:
     explained_by_piece: list[FloatArray]
 
 
-def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEMES) -> Misfit:
+def misfit(rows: FitRows, motions: Sequence[DrivenMotion], themes: Sequence[Theme] = THEMES) -> Misfit:
     """Test every theme, step by step: what is found first is part of the model when the rest is tested."""
     top = np.maximum(np.max([np.abs(m.twist).max(axis=0) for m in motions], axis=0), 1e-9)
     sensors = list(dict.fromkeys(sensor for motion in motions for sensor in motion.piece.record.columns))
@@ -71,7 +71,7 @@ def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEM
     found_columns = np.zeros(0, dtype=int)
     while True:
         linear, residuals = _whitened(rows, [columns[:, :, found_columns] for columns in columns_by_piece])
-        question = _Asked.of(linear, columns_by_piece, found_columns)
+        question = _Unexplained.of(linear, columns_by_piece, found_columns)
         names = {theme.theme for theme in found_themes}
         scores = {
             name: question.score(theme_columns) for name, theme_columns in columns_by_theme.items() if name not in names
@@ -110,10 +110,12 @@ def with_cause(misfit_result: Misfit, cause: Sequence[FloatArray]) -> Misfit:
 
 def chance(linear: Linear, columns_by_piece: Sequence[FloatArray]) -> float:
     """The chance that noise alone follows what some columns show (C, rows, K) of each piece, as they do, or more."""
-    return _Asked.of(linear, columns_by_piece, np.zeros(0, dtype=int)).score(np.arange(columns_by_piece[0].shape[2]))[1]
+    return _Unexplained.of(linear, columns_by_piece, np.zeros(0, dtype=int)).score(
+        np.arange(columns_by_piece[0].shape[2])
+    )[1]
 
 
-def memory_beside(rows: Rows, cause: Sequence[FloatArray]) -> Sequence[AutoRegression]:
+def memory_beside(rows: FitRows, cause: Sequence[FloatArray]) -> Sequence[AutoRegression]:
     """The memory of each column, of what is left beside what a cause shows (C, rows, K) of each piece."""
     return _whitened(rows, cause)[0].memory
 
@@ -124,13 +126,13 @@ def _likeliest(scores: Mapping[str, tuple[float, float, int]]) -> str:
 
 
 def _beside(
-    rows: Rows, columns_by_piece: Sequence[FloatArray], found_columns: IntArray, theme_columns: IntArray
+    rows: FitRows, columns_by_piece: Sequence[FloatArray], found_columns: IntArray, theme_columns: IntArray
 ) -> tuple[float, float, int]:
     """The score of some columns, by the memory of what is left where they are taken, too."""
     linear, _ = _whitened(
         rows, [columns[:, :, np.concatenate([found_columns, theme_columns])] for columns in columns_by_piece]
     )
-    return _Asked.of(linear, columns_by_piece, found_columns).score(theme_columns)
+    return _Unexplained.of(linear, columns_by_piece, found_columns).score(theme_columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +195,7 @@ class Gram:
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
+class _Unexplained:
     """What is left of a fit, and of the columns that may explain it. known_columns: which columns explain already;
     columns_by_piece: those columns (C, rows, K) of each piece."""
 
@@ -203,7 +205,7 @@ class _Asked:
     columns_by_piece: Sequence[FloatArray]
 
     @classmethod
-    def of(cls, linear: Linear, columns_by_piece: Sequence[FloatArray], found_columns: IntArray) -> _Asked:
+    def of(cls, linear: Linear, columns_by_piece: Sequence[FloatArray], found_columns: IntArray) -> _Unexplained:
         gram = Gram.of(linear, columns_by_piece)
         return cls(linear, gram, np.concatenate([gram.fitted, 1 + gram.count + found_columns]), columns_by_piece)
 
@@ -239,7 +241,7 @@ class _Asked:
 
 
 def _whitened(
-    rows: Rows, kept_columns: Sequence[FloatArray]
+    rows: FitRows, kept_columns: Sequence[FloatArray]
 ) -> tuple[Linear, tuple[list[FloatArray], list[FloatArray]]]:
     """(the fit with the memory of what it and `kept_columns` leave; what they leave (C, rows) of each piece, and what
     rounded inputs make of the rest).
@@ -256,7 +258,7 @@ def _whitened(
 
 
 def left_beside(
-    rows: Rows, linear: Linear, kept_columns: Sequence[FloatArray]
+    rows: FitRows, linear: Linear, kept_columns: Sequence[FloatArray]
 ) -> tuple[list[FloatArray], list[FloatArray], list[FloatArray]]:
     """(residuals without what parameters, `kept_columns`, the start of each piece and rounded inputs explain, what of
     that rounded inputs do, what all that may be off by)."""

@@ -24,12 +24,12 @@ from scipy.special import fdtrc
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import HOLDS, NEIGHBOURS, REPEATS, REST, ROUNDING, Binned, Noise
-from omnidyn.identification.output_error.linear.motion import Motion
-from omnidyn.identification.output_error.linear.rows import TINY, Linear, Rows
+from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion
+from omnidyn.identification.output_error.linear.rows import TINY, FitRows, Linear
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.outputs import SPEEDS, TRAVEL
 from omnidyn.identification.structure.misfit import left_beside
-from omnidyn.identification.structure.windows import Shown, Windows, shown
+from omnidyn.identification.structure.windows import ResidualWindows, Shown, shown
 from omnidyn.run import UNITS
 from omnidyn.statistics import sensor_step, stretches
 
@@ -61,7 +61,7 @@ class Levels:
         return dict(shares) | {name: max(shares[name], self.noise[name].share) for name in self.beyond_names}
 
 
-def noise_levels(linear: Linear, motions: Sequence[Motion], is_pulled_in: bool = False) -> Levels:
+def noise_levels(linear: Linear, motions: Sequence[DrivenMotion], is_pulled_in: bool = False) -> Levels:
     """What the log shows of the noise of each output, and whether the fit leaves more.
 
     is_pulled_in: whether residuals are as Student's t counts them (tails.py), and so no longer those of the rows.
@@ -102,7 +102,7 @@ def _without_pull(linear: Linear) -> list[FloatArray]:
     ]
 
 
-def _of_column(rows: Rows, c: int, windows: Shown, memory: AutoRegression, is_pulled_in: bool) -> list[Noise]:
+def _of_column(rows: FitRows, c: int, windows: Shown, memory: AutoRegression, is_pulled_in: bool) -> list[Noise]:
     """By every source that tells, best first."""
     name, i = rows.problem.columns[c]
     taken_factor, moves, unit = _taken(rows), _moves(rows, c), unit_of(name, i)
@@ -256,7 +256,7 @@ def _repeated(windows: Shown, memory: AutoRegression, counts_on: bool) -> _Test 
     return _both_ways(test(way), test(way.white(memory)) if memory.remembers else None)
 
 
-def _neighbours(rows: Rows, c: int, memory: AutoRegression) -> _Test | None:
+def _neighbours(rows: FitRows, c: int, memory: AutoRegression) -> _Test | None:
     """Of outputs whose rows are fast: second and fourth differences are then those of white noise, as what is left."""
     if memory.remembers:
         return None
@@ -276,13 +276,13 @@ def _neighbours(rows: Rows, c: int, memory: AutoRegression) -> _Test | None:
     return _beside_all(rows, c, noise, degrees)
 
 
-def _rounded(rows: Rows, c: int) -> _Test | None:
+def _rounded(rows: FitRows, c: int) -> _Test | None:
     """Of outputs that an encoder counts, whose noise is little more than what it rounds: tick^2/12."""
     tick = float(rows.problem.tick[c])
     return _beside_all(rows, c, tick**2 / 12.0, KNOWN_DEGREES) if tick > 0.0 else None
 
 
-def _beside_all(rows: Rows, c: int, noise: float, degrees: float) -> _Test:
+def _beside_all(rows: FitRows, c: int, noise: float, degrees: float) -> _Test:
     """A variance of noise beside all residuals of a column."""
     residuals = np.concatenate([rows.residual[k][j][rows.masks[k][j]] for k, j in _where(rows, c)])
     mean_square = float(np.mean(residuals**2))
@@ -292,32 +292,32 @@ def _beside_all(rows: Rows, c: int, noise: float, degrees: float) -> _Test:
     )
 
 
-def _where(rows: Rows, c: int) -> list[tuple[int, int]]:
+def _where(rows: FitRows, c: int) -> list[tuple[int, int]]:
     """Pieces that have a column and known rows of it, and which of theirs it is."""
     piece_columns = [(k, columns.index(c)) for k, columns in enumerate(rows.column) if c in columns]
     return [(k, j) for k, j in piece_columns if rows.masks[k][j].any()]
 
 
-def _shown(rows: Rows, c: int) -> list[FloatArray]:
+def _shown(rows: FitRows, c: int) -> list[FloatArray]:
     """What the log shows of a column in the known rows of each of these pieces."""
     column_pieces = [(rows.pieces[k], rows.masks[k][j], j) for k, j in _where(rows, c)]
     return [piece.record.outputs[piece.first : piece.last + 1, j][mask] for piece, mask, j in column_pieces]
 
 
-def _step(rows: Rows, c: int) -> float:
+def _step(rows: FitRows, c: int) -> float:
     """The step in which a column was measured, 0 where none shows."""
     windows = _shown(rows, c)
     return max(float(rows.problem.tick[c]), sensor_step(np.concatenate(windows)) if windows else 0.0)
 
 
-def _moves(rows: Rows, c: int) -> float:
+def _moves(rows: FitRows, c: int) -> float:
     """Root mean square of what an output shows; of what is no speed, about its mean."""
     values = np.concatenate([*_shown(rows, c), np.zeros(0)])
     centred_values = values if rows.problem.columns[c][0] in SPEEDS or not values.size else values - values.mean()
     return float(np.sqrt(np.mean(centred_values**2))) if centred_values.size else 0.0
 
 
-def _taken(rows: Rows) -> float:
+def _taken(rows: FitRows) -> float:
     """Rows over those that are left once the fit has taken some for its numbers and starts."""
     total = sum(int(mask.sum()) for mask in rows.masks)
     free = len(rows.problem.parameters) + sum(int(piece.free.sum()) for piece in rows.pieces)
@@ -363,7 +363,7 @@ class _Way:
         """Windows (m, L) along these ways, (m, d)."""
         return (values if self.memory is None else _through(self.memory, values.T).T) @ self.ways
 
-    def power(self, windows: Windows) -> _Power:
+    def power(self, windows: ResidualWindows) -> _Power:
         """By groups."""
         squares = _summed(windows.groups, (self.seen(windows.values) ** 2).sum(axis=1))
         return _Power(
@@ -399,7 +399,7 @@ def _through(memory: AutoRegression, columns: FloatArray) -> FloatArray:
 BINS, LEAST_BIN_ROWS = 16, 5  # of a picture; rows of a bin that is shown
 
 
-def binned(rows: Rows, motions: Sequence[Motion], column: int) -> tuple[Binned, ...]:
+def binned(rows: FitRows, motions: Sequence[DrivenMotion], column: int) -> tuple[Binned, ...]:
     """The residuals of one column of the problem."""
     name, i = rows.problem.columns[column]
     residual, values_by_label = [], {}

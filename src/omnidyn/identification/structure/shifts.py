@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.identification.output_error.linear.rows import EIGEN_TOLERANCE, Linear, Rows
+from omnidyn.identification.output_error.linear.rows import EIGEN_TOLERANCE, FitRows, Linear
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.stability import LOGS, TIME, Level, Shift, Split, Stability
@@ -56,7 +56,7 @@ def stability(linear: Linear) -> Stability:
     return _Look(Linear(linear.rows, memory_beside(linear.rows, _after(linear.rows, changes.likely[0])))).stability()
 
 
-def _after(rows: Rows, share: float) -> list[FloatArray]:
+def _after(rows: FitRows, share: float) -> list[FloatArray]:
     """What the numbers show after a share of each log, and not before: slopes (C, rows, P) of each piece."""
     late_rows = [
         piece.record.t[piece.first : piece.last + 1] - piece.record.t[0]

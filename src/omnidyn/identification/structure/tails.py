@@ -20,11 +20,12 @@ from omnidyn.clocks import time_of_row
 from omnidyn.identification.lack_of_fit import LOSS, Remedy, Wild
 from omnidyn.identification.methods import NU
 from omnidyn.identification.output_error.engines.engine import row_terms
-from omnidyn.identification.output_error.linear.blocks import Blocks
-from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.blocks import BlockProducts
+from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion
 from omnidyn.identification.output_error.linear.rows import solved
 from omnidyn.identification.output_error.problem.problem import Parts, Problem
 from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.selection.blocks import compare_blocks
 from omnidyn.identification.structure.misfit import Misfit
 from omnidyn.model.mass import mass_matrix
 from omnidyn.statement import NOTE, Statement
@@ -38,7 +39,7 @@ SPRINKLED = 0.01  # chance of so many of them near each other, or where it chang
 ROUNDS = 20  # of weights and fit in turn
 
 
-def wild_samples(misfit_result: Misfit, piece_motions: Sequence[Motion]) -> dict[str, Wild]:
+def wild_samples(misfit_result: Misfit, piece_motions: Sequence[DrivenMotion]) -> dict[str, Wild]:
     """Output -> its wild samples, where there are some: in what is left beside all that residuals follow, made white.
 
     F. R. Hampel's rule with the median absolute deviation, J. Am. Stat. Assoc. 69, 383 (1974), where those of every
@@ -69,7 +70,7 @@ def wild_samples(misfit_result: Misfit, piece_motions: Sequence[Motion]) -> dict
     return outliers_by_output
 
 
-def _change(motion: Motion) -> FloatArray:
+def _change(motion: DrivenMotion) -> FloatArray:
     """How much the motion changes about each row (n,): the largest change over a row, in kinetic energy."""
     step = np.diff(motion.twist, axis=0, prepend=motion.twist[:1])
     energy = np.einsum("ni,ij,nj->n", step, mass_matrix(motion.robot), step)
@@ -106,7 +107,7 @@ def calmer(misfit_result: Misfit, outliers_by_output: Mapping[str, Wild]) -> tup
     columns = np.column_stack([j, linear.white(misfit_result.columns_by_piece)])
     plain_losses, robust = list[float](), list[float]()
     scale = float(robust_std(e[e != 0.0], 0.0))
-    for block_rows in Blocks(
+    for block_rows in BlockProducts(
         linear, [columns_by_piece[:, :, :0] for columns_by_piece in misfit_result.columns_by_piece]
     ).block:
         other_rows, bound = np.delete(np.arange(len(e)), block_rows), HUBER_CLIP * scale
@@ -117,10 +118,10 @@ def calmer(misfit_result: Misfit, outliers_by_output: Mapping[str, Wild]) -> tup
         )
         plain_losses.append(plain_loss)
         robust.append(robust_loss)
-    change = (np.array(plain_losses) - robust) / max(sum(plain_losses), 1e-300)
+    comparison = compare_blocks(plain_losses, robust)
     percent = 100.0 * max(outliers.share for outliers in outliers_by_output.values())
     cause = Statement("outliers", NOTE, numbers={"percent": percent})
-    return (Remedy(LOSS, cause, float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change))), share=0.0),)
+    return (Remedy(LOSS, cause, comparison.gain, comparison.std, share=0.0, comparison=comparison),)
 
 
 def _students(columns: FloatArray, e: FloatArray, start_coefficients: FloatArray, scale: float) -> FloatArray:

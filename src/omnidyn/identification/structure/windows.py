@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.clocks import usual_step
-from omnidyn.identification.output_error.linear.motion import Motion
-from omnidyn.identification.output_error.linear.rows import TINY, Rows
+from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion
+from omnidyn.identification.output_error.linear.rows import TINY, FitRows
 from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.logs.plateaus import COMMANDS, command_changes
 from omnidyn.statistics import stretches
@@ -36,19 +36,19 @@ Found = tuple[int, int, int, Hashable]  # piece, column in it, first known row, 
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
+class ResidualWindows:
     """values (m, L): residuals in m windows; groups (m,): those of one command, or of one set of repeats."""
 
     values: FloatArray
     groups: IntArray
 
-    def __add__(self, windows: Windows) -> Windows:
+    def __add__(self, windows: ResidualWindows) -> ResidualWindows:
         """Both, the groups apart."""
         groups = np.concatenate([self.groups, windows.groups + self.groups.max(initial=-1) + 1])
-        return Windows(np.concatenate([self.values, windows.values]), groups)
+        return ResidualWindows(np.concatenate([self.values, windows.values]), groups)
 
     @classmethod
-    def of(cls, rows: Rows, places: Sequence[Found], length: int) -> Windows:
+    def of(cls, rows: FitRows, places: Sequence[Found], length: int) -> ResidualWindows:
         """Of (piece, column in it, first known row, group)."""
         names = {name: i for i, name in enumerate(dict.fromkeys(name for *_, name in places))}
         values = [rows.residual[k][j][rows.masks[k][j]][first : first + length] for k, j, first, _ in places]
@@ -65,10 +65,10 @@ class Shown:
     """The windows of one column. step [s]: of its rows. repeat_windows: those with repeats, by sets."""
 
     step: float
-    held_windows: Windows
-    busy: Windows
-    resting: Windows
-    repeat_windows: Windows
+    held_windows: ResidualWindows
+    busy: ResidualWindows
+    resting: ResidualWindows
+    repeat_windows: ResidualWindows
     row_gap: int  # rows that repeats are from each other, at least
 
 
@@ -124,14 +124,14 @@ class _Column:
         return joined_runs
 
 
-def slowest(motions: Sequence[Motion]) -> float:
+def slowest(motions: Sequence[DrivenMotion]) -> float:
     """The slowest time constant of the fitted robot [s], in the median of rows."""
     decay_rates = np.concatenate([np.abs(np.linalg.eigvals(motion.decay)).max(axis=1) for motion in motions])
     steps, decays = np.concatenate([np.diff(motion.t) for motion in motions]), (decay_rates > 0.0) & (decay_rates < 1.0)
     return float(np.median(-steps[decays] / np.log(decay_rates[decays]))) if decays.any() else np.inf
 
 
-def shown(rows: Rows, motions: Sequence[Motion]) -> list[Shown]:
+def shown(rows: FitRows, motions: Sequence[DrivenMotion]) -> list[Shown]:
     """The windows of each column of the problem."""
     constant = slowest(motions)
     commands = _commands(rows.pieces)
@@ -144,8 +144,8 @@ def shown(rows: Rows, motions: Sequence[Motion]) -> list[Shown]:
 
 
 def _of_column(
-    rows: Rows,
-    motions: Sequence[Motion],
+    rows: FitRows,
+    motions: Sequence[DrivenMotion],
     c: int,
     settling_time: float,
     repeats: Sequence[_Set],
@@ -173,14 +173,17 @@ def _of_column(
     repeat_windows, row_gap = _again(parts, repeats, length)
     return Shown(
         step,
-        *(Windows.of(rows, places, length) for places in (held_windows, busy_windows, rest_windows, repeat_windows)),
+        *(
+            ResidualWindows.of(rows, places, length)
+            for places in (held_windows, busy_windows, rest_windows, repeat_windows)
+        ),
         row_gap=row_gap,
     )
 
 
 def _column(
-    rows: Rows,
-    motion: Motion,
+    rows: FitRows,
+    motion: DrivenMotion,
     k: int,
     j: int,
     settling_time: float,

@@ -12,7 +12,7 @@ from omnidyn.logs.clock.restarts import CLOCK, Restart
 from omnidyn.logs.clock.stamps import astray
 from omnidyn.logs.column import Column
 from omnidyn.logs.segments import GAP
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.statement import Statement
 
 Notes = list[Statement | str]
@@ -56,7 +56,7 @@ class Clock:
         self._bare = False  # whether milliseconds stand without leading zeros
         self._days = 0  # midnights passed since the first time of day
 
-    def times(self, table: Table, column: Column, notes: Notes) -> FloatArray:
+    def times(self, table: FileTable, column: Column, notes: Notes) -> FloatArray:
         """Times of the rows [s], shape (rows,), NaN where missing. What was decided goes to `notes`.
 
         Raises InputError at the first cell that is neither a number nor a date.
@@ -151,7 +151,7 @@ class Clock:
         self._begin = float(begins[-1])  # type: ignore[arg-type]
         return missing_counts
 
-    def _from_dates(self, table: Table, name: str, cells: tuple[str, ...], notes: Notes) -> FloatArray:
+    def _from_dates(self, table: FileTable, name: str, cells: tuple[str, ...], notes: Notes) -> FloatArray:
         self._bare = self._bare or _are_bare(cells)
         if self._bare:
             notes.append(f"{name} has milliseconds without leading zeros: .5 is 5 ms")

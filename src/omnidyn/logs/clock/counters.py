@@ -20,7 +20,7 @@ from omnidyn.logs.clock.restarts import (
 )
 from omnidyn.logs.column import Column
 from omnidyn.logs.segments import segments
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.statistics import median, robust_std
 from omnidyn.units import TURN, parse_unit
 
@@ -285,7 +285,7 @@ def _alone(odd: IntArray, away: FloatArray, last: int) -> BoolArray:
 class Counters:
     """Reads counts and speeds of a table. t [s]: of its rows, shape (rows,). found: restarts of its clock."""
 
-    def __init__(self, table: Table, t: FloatArray, restarts: Sequence[Restart]):
+    def __init__(self, table: FileTable, t: FloatArray, restarts: Sequence[Restart]):
         self.table, self.t, self.found = table, t, list(restarts)
         self.begins = np.flatnonzero(np.isin(table.lines, [restart.line for restart in restarts])).tolist()
         self.counters: list[Counter] = []

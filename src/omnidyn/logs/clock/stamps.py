@@ -14,7 +14,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME
-from omnidyn.logs.table.table import Declaration, Table
+from omnidyn.logs.table.table import Declaration, FileTable
 
 _SECOND_WORDS = ("sec", "secs", "seconds")
 _REST = {
@@ -43,7 +43,7 @@ def astray(stamps: FloatArray | IntArray, day: float) -> BoolArray:
     return stray if stray.sum() <= max(1.0, ASTRAY_SHARE * len(stray)) else np.zeros(len(stray), dtype=bool)
 
 
-def with_joined_stamp(table: Table) -> Table:
+def with_joined_stamp(table: FileTable) -> FileTable:
     """The table with a column t in front where whole seconds and the rest of a second stand in two columns.
 
     The first such pair counts. A table that has a column t stays as it is.
@@ -76,7 +76,7 @@ def _rest_of_a_second(values: np.ndarray) -> bool:
 BY_RATE = "t (rate)"  # where a column t that is no time stands in the file
 
 
-def timed(tables: Iterable[Table], rate: float | None, skipped: bool = False) -> Iterator[Table]:
+def timed(tables: Iterable[FileTable], rate: float | None, skipped: bool = False) -> Iterator[FileTable]:
     """The tables of one file, with a column of time [s] in front where a rate [1/s] is given: row k is at k / rate.
 
     skipped: whether rows may have been left out: then lines are counted, not rows. Raises InputError for a rate of 0

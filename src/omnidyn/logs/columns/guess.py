@@ -30,7 +30,7 @@ from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is
 from omnidyn.logs.columns.names import AGAIN, BRACKETS, read_name
 from omnidyn.logs.columns.plausible import beyond_range
 from omnidyn.logs.columns.wheel_numbers import BY_PLACES, proposed_wheels, wheel_numbers
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.model.robot import Robot
 from omnidyn.statement import ERROR, WARNING, Statement
 from omnidyn.units import COUNT, COUNT_RATE, Unit, known_unit, parse_unit
@@ -50,7 +50,7 @@ NOT_OF_A_MOTOR = frozenset({words.X, words.Y, "vx", "vy", words.YAW, words.SUPPL
 
 
 def guess_columns(
-    table: Table,
+    table: FileTable,
     robot: Robot | None = None,
     assume: Mapping[str, str] | None = None,
     taken: Mapping[str, str] | None = None,
@@ -110,7 +110,7 @@ def _without_measured_power(names: list[str]) -> list[str]:
     return names if set(drives) <= set(powers) else [name for name in names if name not in powers]
 
 
-def _take_said(table: Table, assumed: Mapping[str, str], guess: Guess) -> None:
+def _take_said(table: FileTable, assumed: Mapping[str, str], guess: Guess) -> None:
     """Columns of which the format itself says what they are: the first of a kind is taken, where it can be that."""
     for name, declaration in table.says.items():
         declared_unit = (
@@ -127,7 +127,7 @@ def _take_said(table: Table, assumed: Mapping[str, str], guess: Guess) -> None:
                 guess.doubts.append(unlikely)
 
 
-def _unlikely(table: Table, name: str, component: str, unit: str, robot: Robot | None) -> Doubt | None:
+def _unlikely(table: FileTable, name: str, component: str, unit: str, robot: Robot | None) -> Doubt | None:
     """The doubt about a column whose values are not what the format says that they are; None where they can be."""
     if place(component) is None or isinstance(table.columns[name], tuple):
         return None
@@ -142,7 +142,7 @@ def _meant(name: str, names: Iterable[str]) -> list[str]:
     return numbered if numbered and name not in names and not place(f"{name}1") else [name]
 
 
-def _is_used(name: str, table: Table, components: Iterable[str]) -> bool:
+def _is_used(name: str, table: FileTable, components: Iterable[str]) -> bool:
     """Whether an assumed unit meets a column: by its name, or as a component or the letter of one."""
     components_and_letters = {spelling for component in components for spelling in (component, letter_of(component))}
     # u stands for commands of motors in any unit: a duty is one that is no voltage.
@@ -172,7 +172,12 @@ def _order(component: str) -> tuple[int, str, int]:
 
 
 def _take(
-    table: Table, name: str, numbers: Mapping[str, int], assumed: Mapping[str, str], robot: Robot | None, guess: Guess
+    table: FileTable,
+    name: str,
+    numbers: Mapping[str, int],
+    assumed: Mapping[str, str],
+    robot: Robot | None,
+    guess: Guess,
 ) -> None:
     """One column: which component it is, in which unit; or a doubt."""
     table_unit = table.units.get(name, "")
@@ -198,7 +203,7 @@ def _take(
         _enter(table, name, component, unit, name in assumed or assumption is not None, guess)
 
 
-def _doubt_words(table: Table, numbers: Mapping[str, int], guess: Guess) -> None:
+def _doubt_words(table: FileTable, numbers: Mapping[str, int], guess: Guess) -> None:
     """Columns that are called like a component, and whose cells begin like numbers but are none: 5.0V, 1.250.000."""
     for name in table.names:
         cells = table.columns[name]
@@ -230,7 +235,7 @@ def _doubt_letters(names: list[str], guess: Guess) -> None:
         ]
 
 
-def _enter(table: Table, name: str, component: str, unit: Unit, is_declared: bool, guess: Guess) -> None:
+def _enter(table: FileTable, name: str, component: str, unit: Unit, is_declared: bool, guess: Guess) -> None:
     """Take a column, where its unit measures what the component is and its values may be so many of it.
 
     is_declared: whether the user said the unit.
@@ -270,7 +275,7 @@ def _enter_rim(name: str, component: str, unit: Unit, guess: Guess) -> None:
     guess.note("speeds_of_rims", unit=unit.text)
 
 
-def _refuse_twins(table: Table, guess: Guess, taken: Mapping[str, str]) -> None:
+def _refuse_twins(table: FileTable, guess: Guess, taken: Mapping[str, str]) -> None:
     """Raises InputError where two columns have one name and the first would be taken; equal ones are one.
 
     taken: column -> component, where the user says which it is.
@@ -298,7 +303,7 @@ def _are_equal(one: FloatArray | tuple[str, ...], other: FloatArray | tuple[str,
     return np.array_equal(one, other, equal_nan=True)
 
 
-def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], guess: Guess) -> None:
+def _take_bench(table: FileTable, names: list[str], assumed: Mapping[str, str], guess: Guess) -> None:
     """A log of one motor, whose columns need no number: voltage, current, velocity, position.
 
     Several columns of one kind, such as left_speed and right_speed, are wheels, and nobody knows which is which.
@@ -328,7 +333,7 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], gues
         guess.note("one_motor", numbered=len(numbered))
 
 
-def _ask_where_motion_differs(table: Table, numbers: Mapping[str, int], guess: Guess) -> None:
+def _ask_where_motion_differs(table: FileTable, numbers: Mapping[str, int], guess: Guess) -> None:
     """Take back wheels told by their places, where the motion of the body says that their order is another one."""
     placed = [name for name in numbers if read_name(name).place is not None]
     speeds = {key: column.name for key, column in guess.columns.items() if re.fullmatch(r"w\d+", key)}
@@ -348,7 +353,7 @@ def _drop_unspoken(alike: dict[str, list[str]]) -> None:
             alike[key] = [name for name in alike.get(key, []) if name in spoken]
 
 
-def _bench_component(table: Table, name: str) -> str:
+def _bench_component(table: FileTable, name: str) -> str:
     """The component of a motor that a name without a number says, "" where it says none."""
     parts = read_name(name)
     letter = numbered_kind(parts._replace(number=1), known_unit(table.units.get(name, "")))
@@ -367,7 +372,7 @@ def _forget(names: list[str], guess: Guess) -> None:
         guess.si.pop(name, None)
 
 
-def _take_single(table: Table, name: str, component: str, assumed: Mapping[str, str], guess: Guess) -> None:
+def _take_single(table: FileTable, name: str, component: str, assumed: Mapping[str, str], guess: Guess) -> None:
     parts = read_name(name)
     text = assumed.get(name) or assumed.get(letter_of(component)) or table.units.get(name, "")
     unit = known_unit(text) or parts.unit
@@ -388,7 +393,7 @@ class UnclearTimeError(InputError):
     rows: int
 
 
-def refuse_doubtful(columns: ColumnMap, table: Table) -> None:
+def refuse_doubtful(columns: ColumnMap, table: FileTable) -> None:
     """Raises InputError where nothing tells the time: without it there is no log."""
     if TIME in columns.columns:
         return

@@ -17,7 +17,7 @@ from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.guessed import UNIT, Guess, doubt, first_word, floats, is_numeric
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.columns.names import read_name
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.units import TIME as TIME_UNIT
 from omnidyn.units import Unit, known_unit, parse_unit
 
@@ -28,7 +28,7 @@ SAME_MOTION = 30.0  # a speed and what its position moved differ by less: a gear
 TIME_NAMES = ("s", "ms", "us", "ns")
 
 
-def take_time(table: Table, assumed: Mapping[str, str], guess: Guess) -> None:
+def take_time(table: FileTable, assumed: Mapping[str, str], guess: Guess) -> None:
     """The column of time and its unit, which must be given or unmistakable."""
     candidates = [name for name in table.names if words.TIME in read_name(name).roles]
     dates = [name for name in candidates if is_dates(table.columns[name])]
@@ -76,7 +76,7 @@ def _is_span(name: str) -> bool:
     return bool(re.search(r"(?:^|[\W_])(?:d|dt|delta|diff|step|period|cycle|remaining|left)(?:$|[\W_])", name.lower()))
 
 
-def _take_steps(table: Table, name: str, assumed: Mapping[str, str], guess: Guess) -> None:
+def _take_steps(table: FileTable, name: str, assumed: Mapping[str, str], guess: Guess) -> None:
     """A column that holds the time from row to row, where there is no other clock: it is summed up."""
     text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
     values = floats(table.columns[name])
@@ -87,13 +87,13 @@ def _take_steps(table: Table, name: str, assumed: Mapping[str, str], guess: Gues
         guess.doubts.append(doubt(name, TIME, "unit_of_other", unit=unit.text, quantity="time"))
 
 
-def _is_clock(table: Table, name: str, assumed: Mapping[str, str]) -> bool:
+def _is_clock(table: FileTable, name: str, assumed: Mapping[str, str]) -> bool:
     """Whether a column has a unit of time, increases, and is no span."""
     unit = _unit(table, name, assumed)
     return unit is not None and unit.quantity == TIME_UNIT and _increases(table.columns[name]) and not _is_span(name)
 
 
-def _unit(table: Table, name: str, assumed: Mapping[str, str]) -> Unit | None:
+def _unit(table: FileTable, name: str, assumed: Mapping[str, str]) -> Unit | None:
     """The unit assumed, of a row of units, at the end of the name, or the name itself: ms."""
     return known_unit(assumed.get(name) or table.units.get(name, "")) or read_name(name).unit or known_unit(name)
 
@@ -105,7 +105,7 @@ def _increases(values: FloatArray | tuple[str, ...]) -> bool:
     return len(times) > 1 and float(np.mean(times[1:] > times[:-1])) > 0.9
 
 
-def _plausible_time(table: Table, values: FloatArray, name: str, declared_unit: str, guess: Guess) -> Unit | None:
+def _plausible_time(table: FileTable, values: FloatArray, name: str, declared_unit: str, guess: Guess) -> Unit | None:
     """The one unit under which rows are as far apart as a log has them; None where there are two or none.
 
     Of several, a clock that counts from 1970 or a motion that fits its speed leaves one.
@@ -135,7 +135,7 @@ def _is_step(step: float, rows: int) -> bool:
     return SHORTEST_STEP <= step <= LONGEST_STEP and (step <= USUAL_STEP or step * rows <= LONGEST_SLOW)
 
 
-def _of_motion(table: Table, times: FloatArray, possible: list[Unit], guess: Guess) -> list[Unit]:
+def _of_motion(table: FileTable, times: FloatArray, possible: list[Unit], guess: Guess) -> list[Unit]:
     """The units under which speeds are those of what is moved in the log; all of them where it has no such pair."""
     steps = np.diff(times)
     for speeds, places in _pairs(guess):
@@ -165,7 +165,7 @@ def _pairs(guess: Guess) -> list[tuple[list[Column], list[Column]]]:
 
 
 def refuse_second_time(
-    table: Table, assumed: Mapping[str, str], column_map: ColumnMap | None, overrides: Mapping[str, Column]
+    table: FileTable, assumed: Mapping[str, str], column_map: ColumnMap | None, overrides: Mapping[str, Column]
 ) -> None:
     """Raises InputError where a table whose time was made of a rate has a time of its own, or one is named."""
     rate_column = next(name for name, declaration in table.says.items() if declaration.component == TIME)

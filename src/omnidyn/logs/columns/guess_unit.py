@@ -14,7 +14,7 @@ from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
 from omnidyn.logs.columns.guessed import Doubt, Guess, doubt, floats
 from omnidyn.logs.columns.mapping import SIDED, component_channel, quantity_of
 from omnidyn.logs.columns.plausible import MOST_VOLTS, VOLTS, beyond_range, likely_units
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.units import ANGLE, Unit, parse_unit
@@ -30,7 +30,7 @@ FASTEST_TURN = 35.0  # [rad/s] of a body: the 2000 deg/s at which gyroscopes end
 SI = {"rad_s": "rad/s", "m_s": "m/s"}
 
 
-def unit_of(table: Table, name: str, component: str, robot: Robot | None, guess: Guess) -> Unit | None:
+def unit_of(table: FileTable, name: str, component: str, robot: Robot | None, guess: Guess) -> Unit | None:
     """The unit where the file gives none: SI, said in words; volts only where they cannot be a duty."""
     suffix = si_suffix(component)
     if suffix == "rad" and _turns_in_degrees(floats(table.columns[name])):
@@ -89,7 +89,7 @@ def _scales(largest: float) -> tuple[str, ...]:
     return ("duty",) * (largest <= MOST_DUTY) + ("%",) * (1.0 < largest <= MOST_PERCENT) + scale * (largest > 1.0)
 
 
-def doubt_of_rate(table: Table, name: str, component: str, unit: str = "") -> Doubt | None:
+def doubt_of_rate(table: FileTable, name: str, component: str, unit: str = "") -> Doubt | None:
     """The doubt about a turn rate of the robot that is too large for rad/s; None where there is none.
 
     unit: that the format gives, "" where there is none.
@@ -132,7 +132,7 @@ def _largest(values: FloatArray) -> float:
     return float(finite.max()) if finite.size else 0.0
 
 
-def _command_unit(table: Table, name: str, component: str, robot: Robot | None, guess: Guess) -> Unit | None:
+def _command_unit(table: FileTable, name: str, component: str, robot: Robot | None, guess: Guess) -> Unit | None:
     """Volts or duty? Volts where a name spells them, or the largest lies between 1 and the robot's limit."""
     largest = _largest(floats(table.columns[name]))
     if component.startswith("d") and largest <= 1.0:
@@ -176,7 +176,7 @@ def voltage_limit(robot: Robot | None) -> float | None:
 SAME_SIDE = 0.05  # commands of wheels and of the body agree within this share on one side of the gear only
 
 
-def settle_side(table: Table, robot: Robot | None, guess: Guess) -> None:
+def settle_side(table: FileTable, robot: Robot | None, guess: Guess) -> None:
     """Commands of body and of wheels tell the side of the gear: they differ by the gear ratio on the other one."""
     if robot is None:
         return
@@ -209,7 +209,7 @@ def take_sides(sides: Mapping[str, str], guess: Guess) -> None:
                 guess.columns[component] = replace(guess.columns[component], side=sides[name])
 
 
-def _values(table: Table, columns: list[Column | None]) -> FloatArray:
+def _values(table: FileTable, columns: list[Column | None]) -> FloatArray:
     return np.column_stack(
         [table.measured(c.name, missing=True, skip=True) * c.factor for c in columns if c is not None]
     )

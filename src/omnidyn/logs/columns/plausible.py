@@ -14,10 +14,10 @@ from omnidyn.arrays import FloatArray
 from omnidyn.logs.columns.guessed import UNIT, Doubt, doubt, letter_of
 from omnidyn.units import Unit, parse_unit
 
-USUAL_SHARE = 0.99  # of the values: some are outliers, or codes of a driver
+USUAL_SHARE = 0.99  # of the distinct values: some are outliers, or codes of a driver, however often they are repeated
 
 
-class Range(NamedTuple):
+class UsualRange(NamedTuple):
     """What is usual of a channel, in SI.
 
     most: what its usual size can be. likely: low and high end of what it mostly is, which tells the unit. units: those
@@ -33,13 +33,13 @@ class Range(NamedTuple):
 
 
 MOST_VOLTS = 100.0  # [V] of a motor's driver, or of a battery; more are other units, or steps of a converter
-VOLTS = Range(MOST_VOLTS, (3.0, 60.0), ("mV", "cV", "dV"), "V/COUNTS_PER_VOLT")
-SPEED = Range(20.0, (0.05, 6.0), ("mm/s", "cm/s", "in/s"))
-LENGTH = Range(500.0, (0.3, 50.0), ("mm", "cm", "in"))
+VOLTS = UsualRange(MOST_VOLTS, (3.0, 60.0), ("mV", "cV", "dV"), "V/COUNTS_PER_VOLT")
+SPEED = UsualRange(20.0, (0.05, 6.0), ("mm/s", "cm/s", "in/s"))
+LENGTH = UsualRange(500.0, (0.3, 50.0), ("mm", "cm", "in"))
 RANGES = {
     "supply": VOLTS,
-    "i": Range(200.0, (0.05, 60.0), ("mA",), "A/COUNTS_PER_AMPERE"),
-    "w": Range(3000.0, (1.0, 500.0), ("rpm", "deg/s"), "ticks/COUNTS_PER_TURN/s", math.inf),
+    "i": UsualRange(200.0, (0.05, 60.0), ("mA",), "A/COUNTS_PER_AMPERE"),
+    "w": UsualRange(3000.0, (1.0, 500.0), ("rpm", "deg/s"), "ticks/COUNTS_PER_TURN/s", math.inf),
     "vx": SPEED,
     "vy": SPEED,
     "x": LENGTH,
@@ -48,7 +48,7 @@ RANGES = {
 FAR_SUPPLY = 8.0  # times the voltage limit of a robot: more is no supply of its driver
 
 
-def likely_units(limits: Range, largest: float) -> tuple[str, ...]:
+def likely_units(limits: UsualRange, largest: float) -> tuple[str, ...]:
     """The units in which numbers of this size make sense, and how one of counts is written, for counts."""
     low, high = limits.likely
     units = [unit for unit in limits.units if low <= parse_unit(unit).size * largest <= high]
@@ -67,7 +67,7 @@ def beyond_range(
     a unit that is given is right, a robot says better than a range (`check`), but for its supply.
     """
     letter = letter_of(component.removesuffix("_cmd"))
-    limits, values = RANGES.get(letter), values[np.isfinite(values)]
+    limits, values = RANGES.get(letter), np.unique(values[np.isfinite(values)])
     judged = limits is LENGTH or (limit is not None and letter != "supply")
     if limits is None or not values.size or (is_given and judged):
         return None

@@ -15,7 +15,7 @@ from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.component import component_of_parts, numbered_kind
 from omnidyn.logs.columns.guessed import Guess, doubt, floats
 from omnidyn.logs.columns.names import BRACKETS, read_name, wheels_at
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.model.wheels import MAX_WHEELS, wheel_speed
 from omnidyn.units import known_unit, parse_unit
 
@@ -41,7 +41,7 @@ class Family(NamedTuple):
         return path or "", word.endswith("["), word if of_motor else ""
 
 
-def wheel_numbers(table: Table, names: Iterable[str], guess: Guess) -> dict[str, int]:
+def wheel_numbers(table: FileTable, names: Iterable[str], guess: Guess) -> dict[str, int]:
     """Name -> number of the wheel from 1, of the names with a number or a place; a family from 0 on is shifted.
 
     A family that does not count from 0 itself is shifted with one of its style that does (the current of wheel 0 may
@@ -113,7 +113,7 @@ MOST_WHEELS, LEAST_ROWS = 6, 40  # wheels that are tried; rows needed
 CLEAR_LEAD = 0.05  # of the correlation: by so much the best order is better than the next
 
 
-def proposed_wheels(table: Table, names: Sequence[str], guess: Guess) -> str:
+def proposed_wheels(table: FileTable, names: Sequence[str], guess: Guess) -> str:
     """The words of --column that the motion proposes for columns of wheel speeds; "" where it tells nothing.
 
     The speed of each wheel follows from the speed of the body and the robot's geometry; the order and the signs under

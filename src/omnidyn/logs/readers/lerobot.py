@@ -34,7 +34,7 @@ from omnidyn.logs.readers.parquet import (
 from omnidyn.logs.readers.parquet_pages import declared_bytes
 from omnidyn.logs.readers.reader import Reader, ReadOptions
 from omnidyn.logs.table.rows import refuse_infinite
-from omnidyn.logs.table.table import MAX_CELLS, Declaration, Table
+from omnidyn.logs.table.table import MAX_CELLS, Declaration, FileTable
 from omnidyn.progress import Report
 
 ACTION, STATE = "action", "observation.state"
@@ -65,7 +65,7 @@ class _EpisodeClock:
         return out
 
 
-def tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
+def tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[FileTable]:
     """The tables of a Parquet file or of a dataset; see the contract."""
     files = data_files(Path(path)) if is_dataset_folder(path) else [Path(path)]
     lists = _lists(files[0])
@@ -124,7 +124,7 @@ def _names_of(info: Mapping[str, Any], feature: str) -> list[str]:
 
 def _dataset_tables(
     files: Sequence[Path], names: Mapping[str, list[str]], source: str, rows: int, options: ReadOptions
-) -> Iterator[Table]:
+) -> Iterator[FileTable]:
     """The tables of the files of a dataset, one after the other."""
     columns_of = {
         f"{feature}.{name}": (feature, feature_names.index(name), component, unit)
@@ -152,10 +152,10 @@ def _dataset_tables(
     unread = dict.fromkeys(name for feature_names in names.values() for name in feature_names if name not in SPEEDS)
     clock, row_count, digests = _EpisodeClock(), 0, list[str]()
 
-    def table(columns: Mapping[str, FloatArray], lines: IntArray, sha256: str = "") -> Table:
+    def table(columns: Mapping[str, FloatArray], lines: IntArray, sha256: str = "") -> FileTable:
         notes = _notes(len(clock.shifts), list(unread)) if sha256 else ()
         begins = tuple(int(lines[row]) for row in clock.begins) if columns else ()
-        return Table(tuple(units), dict(columns), lines, units, source, sha256, notes, {}, says, begins=begins)
+        return FileTable(tuple(units), dict(columns), lines, units, source, sha256, notes, {}, says, begins=begins)
 
     for file in files:
         for part, digest in _parts(file, list(names), len(units), rows, options):

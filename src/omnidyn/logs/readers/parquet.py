@@ -22,7 +22,7 @@ from omnidyn.logs.readers.parquet_pages import declared_bytes
 from omnidyn.logs.readers.reader import ReadOptions
 from omnidyn.logs.table.header import MAX_COLUMNS, check_name, split_units
 from omnidyn.logs.table.rows import INFINITE, Column, column_of, refuse_infinite, skip_note
-from omnidyn.logs.table.table import MAX_CELLS, Table
+from omnidyn.logs.table.table import MAX_CELLS, FileTable
 from omnidyn.logs.table.text_file import BLOCK_BYTES, TOO_LARGE_REMEDY
 from omnidyn.progress import Report
 
@@ -69,7 +69,7 @@ def parquet_bytes(columns: Mapping[str, FloatArray], units: Mapping[str, str]) -
 # ---- reading -------------------------------------------------------------------------------------------
 
 
-def parquet_tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
+def parquet_tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[FileTable]:
     """The tables of a Parquet file, its rows numbered from 1 in `Table.lines`; see the contract.
 
     Raises InputError for a file that is damaged, has nested columns, or whose rows take more than `max_bytes`, or 200
@@ -86,9 +86,9 @@ def parquet_tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> 
         check_size(file.metadata, pages, len(columns.names), size, options.max_bytes, source)
         reader = _RowGroups(columns, source, options.skip_bad_rows)
 
-        def table(values: dict[str, Column], lines: Any, sha256: str = "") -> Table:
+        def table(values: dict[str, Column], lines: Any, sha256: str = "") -> FileTable:
             notes = (*reader.notes, *(growth(stream, size) if sha256 else ()))
-            return Table(columns.names, values, lines, columns.units, source, sha256, notes, columns.titles)
+            return FileTable(columns.names, values, lines, columns.units, source, sha256, notes, columns.titles)
 
         for row_count, batch in batches_of(pyarrow, file, max(1, min(rows, MAX_CELLS // len(columns.names))), source):
             with damage(pyarrow, source):

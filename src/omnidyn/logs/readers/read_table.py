@@ -16,7 +16,7 @@ from omnidyn.logs.readers.reader import Reader, ReadOptions, completed
 from omnidyn.logs.readers.ros.bags import MCAP, ROS1, ROS2
 from omnidyn.logs.readers.text import TEXT
 from omnidyn.logs.readers.wpilog import WPILOG
-from omnidyn.logs.table.table import ROWS, Table, join
+from omnidyn.logs.table.table import ROWS, FileTable, join
 from omnidyn.progress import Progress, silent
 
 READERS: tuple[Reader, ...] = (
@@ -42,7 +42,7 @@ def read_table(
     max_bytes: int | None = None,
     progress: Progress = silent,
     variables: Sequence[str] = (),
-) -> Table:
+) -> FileTable:
     """Read a table whole, whatever its format. A name that promises another format is noted.
 
     header: False where a text file has none; the columns are then called c1, c2, ... skip_bad_rows: leave out rows
@@ -65,7 +65,7 @@ def iter_tables(
     max_bytes: int | None = None,
     progress: Progress = silent,
     variables: Sequence[str] = (),
-) -> Iterator[Table]:
+) -> Iterator[FileTable]:
     """The tables of a file of any length, at most `rows` rows each; joined they are what `read_table` reads.
 
     Only the last has the sha256 and all notes. A column that begins with numbers and goes on with words is numbers in
@@ -87,7 +87,7 @@ def reader_of(path: str | os.PathLike) -> Reader:
     return next((reader for reader in READERS if kind is not None and reader.kind == kind.name), TEXT)
 
 
-def _tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
+def _tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[FileTable]:
     if rows < 1:
         raise InputError("no rows in a piece", got=rows, expected="1 or more")
     reader, suffix = reader_of(path), Path(path).suffix

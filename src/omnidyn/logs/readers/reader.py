@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.recording import Recording
-from omnidyn.logs.table.table import Table, join
+from omnidyn.logs.table.table import FileTable, join
 from omnidyn.progress import Progress, silent
 
 
@@ -39,19 +39,19 @@ class Reader(NamedTuple):
     kind: str
     word: str
     suffixes: tuple[str, ...]
-    tables: Callable[[str | os.PathLike, int, ReadOptions], Iterator[Table]]
+    tables: Callable[[str | os.PathLike, int, ReadOptions], Iterator[FileTable]]
     least: str = "at least one row"
     recording: Callable[[str | os.PathLike, ReadOptions], Recording] | None = None
     whole: bool = False
     variables: bool = False
 
 
-def completed(tables: Iterable[Table], minimum: str, rows: int = 0) -> Iterator[Table]:
+def completed(tables: Iterable[FileTable], minimum: str, rows: int = 0) -> Iterator[FileTable]:
     """The tables that have rows, each once the next one is there: so the last of them has the hash and all notes.
 
     rows: small ones that follow each other, as those of a dataset with a file per episode, are joined up to so many.
     """
-    waiting: list[Table] = []
+    waiting: list[FileTable] = []
     table = None
     for table in tables:
         if len(table):

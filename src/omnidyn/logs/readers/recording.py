@@ -14,7 +14,7 @@ from omnidyn.logs.clock.stamps import astray
 from omnidyn.logs.table.dialect import MAX_NAME
 from omnidyn.logs.table.header import MAX_COLUMNS
 from omnidyn.logs.table.rows import Column, refuse_infinite
-from omnidyn.logs.table.table import MAX_CELLS, Declaration, Table
+from omnidyn.logs.table.table import MAX_CELLS, Declaration, FileTable
 
 TIME_COLUMN = "t_s"
 DAY_NS = 86_400 * 10**9
@@ -74,7 +74,7 @@ class Recording:
     notes: list[str] = field(default_factory=list)
     salvaged: int | None = None
 
-    def tables(self, rows: int) -> Iterator[Table]:
+    def tables(self, rows: int) -> Iterator[FileTable]:
         """Tables in the order of time: a row per stamp, blank in the columns of topics that have nothing there.
 
         Raises InputError where no topic holds numbers.
@@ -109,8 +109,8 @@ class Recording:
             row_count += len(stamps)
             block: dict[str, Column] = {TIME_COLUMN: (stamps - start) / 1e9, **columns}
             refuse_infinite(block, lines, self.source)
-            yield Table(names, block, lines, *rest, "", notes, says=says, own_clocks=several_clocks)
-        yield Table(
+            yield FileTable(names, block, lines, *rest, "", notes, says=says, own_clocks=several_clocks)
+        yield FileTable(
             names, {}, np.zeros(0, dtype=np.int64), *rest, self.sha256, notes, says=says, own_clocks=several_clocks
         )
 

@@ -30,14 +30,14 @@ from omnidyn.logs.table import dialect
 from omnidyn.logs.table.dialect import SAMPLE_ROWS, SEPARATORS, counts, is_comment, looks_like_number
 from omnidyn.logs.table.header import MAX_COLUMNS, TABS_NOTE, FileLine, Layout, find_layout
 from omnidyn.logs.table.rows import Column, RowParser
-from omnidyn.logs.table.table import MAX_CELLS, ROWS, Table
+from omnidyn.logs.table.table import MAX_CELLS, ROWS, FileTable
 from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY, TextBlock, TextFile
 
 HEAD_ROWS = 100  # the first rows are looked at together to tell how a file is written
 KEPT_COMMENTS = 2  # right above a row: names, and perhaps their units
 
 
-def text_tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
+def text_tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[FileTable]:
     """The tables of a text file; see the head of this file for what is taken and refused, and the contract.
 
     A list with a row for every value (listed) becomes a table of topics, and is held whole.
@@ -51,7 +51,7 @@ def text_tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Ite
     yield from recording_of(chain([first], tables), limit).tables(rows)
 
 
-def _as_they_stand(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
+def _as_they_stand(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[FileTable]:
     """The rows as they stand in the file."""
     file = TextFile(path, options.progress, options.max_bytes)
     head, blocks = _head(file.blocks(rows))
@@ -67,9 +67,9 @@ def _as_they_stand(path: str | os.PathLike, rows: int, options: ReadOptions) -> 
     parser = RowParser(layout, file.source, options.skip_bad_rows, sample)
     block_rows = max(1, min(rows, MAX_CELLS // len(layout.names)))
 
-    def table(columns: dict[str, Column], lines: IntArray, sha256: str = "") -> Table:
+    def table(columns: dict[str, Column], lines: IntArray, sha256: str = "") -> FileTable:
         notes = (*layout.notes, *file.notes, *parser.notes)
-        return Table(layout.names, columns, lines, layout.units, file.source, sha256, notes, layout.titles)
+        return FileTable(layout.names, columns, lines, layout.units, file.source, sha256, notes, layout.titles)
 
     pieces = (
         TextBlock(first + k, texts[k : k + block_rows])
@@ -157,7 +157,7 @@ def is_listed(names: Sequence[str]) -> bool:
     return tuple(name.strip().lower() for name in names) == NAMES
 
 
-def recording_of(tables: Iterable[Table], max_bytes: int) -> Recording:
+def recording_of(tables: Iterable[FileTable], max_bytes: int) -> Recording:
     """The topics of a list; times are in seconds. Raises InputError for a time that is none, or for too many values."""
     stamps: dict[str, array] = {}
     values: dict[str, array] = {}

@@ -26,7 +26,7 @@ from omnidyn.logs.readers.claims import TopicClaim, TopicColumn, tracks_of
 from omnidyn.logs.readers.reader import Reader, ReadOptions
 from omnidyn.logs.readers.recording import LeftOut, Recording, topic_of
 from omnidyn.logs.readers.ros.layout import Leaf, column
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.logs.table.text_file import BLOCK_BYTES, TOO_LARGE_REMEDY
 from omnidyn.progress import Report
 
@@ -320,7 +320,7 @@ def _known(kind: str, name: str, out: TopicColumn) -> TopicColumn:
     return out._replace(unit=unit, component=f"{component}{'_cmd' * command}")
 
 
-def _tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
+def _tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[FileTable]:
     yield from read_wpilog(path, options).tables(rows)
 
 

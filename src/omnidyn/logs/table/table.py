@@ -39,7 +39,7 @@ class Declaration(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class FileTable:
     """A table as it stands in a file.
 
     names: of the columns, in order. columns: name -> floats, shape (rows,), NaN where a cell is blank or nan; or a
@@ -175,9 +175,9 @@ class Table:
             )
 
 
-def join(tables: Iterable[Table], max_bytes: int | None = None) -> Table:
+def join(tables: Iterable[FileTable], max_bytes: int | None = None) -> FileTable:
     """One table from the blocks of a file. Raises InputError when their numbers take more than `max_bytes`."""
-    parts: list[Table] = []
+    parts: list[FileTable] = []
     held_bytes = 0
     for table in tables:
         parts.append(table)

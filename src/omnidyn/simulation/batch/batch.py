@@ -13,7 +13,7 @@ from omnidyn.errors import InputError
 from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.batch.blocks import EXACT_POSE, FAST_POSE, BatchCommands, BlockGroup, GroupRun, drivers_of
-from omnidyn.simulation.batch.choice import BOX, DIRECTION, DUTY, EXACT, GENERAL, VOLTAGE, WHEEL_SPEED, engine_kind
+from omnidyn.simulation.batch.engine_kind import BOX, DIRECTION, DUTY, EXACT, GENERAL, VOLTAGE, WHEEL_SPEED, engine_kind
 from omnidyn.simulation.batch.loops import LoopGroup
 from omnidyn.simulation.batch.parameters import batch_parameters, wheels_of
 from omnidyn.simulation.batch.result import BatchRun, BatchState, Statistics

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.model.actuation import clip_voltage, reaching, voltage_of_duty
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.batch.choice import BOX, DUTY, EXACT, LIMITED
+from omnidyn.simulation.batch.block_march import TOTALS, BlockRows, KeptSamples, march_twist
+from omnidyn.simulation.batch.engine_kind import BOX, DUTY, EXACT, LIMITED
 from omnidyn.simulation.batch.exact import exact_law
 from omnidyn.simulation.batch.fast import fast_law, gauss_two, march_fast
 from omnidyn.simulation.batch.implicit import implicit_law, march_implicit, stages, with_share
 from omnidyn.simulation.batch.limited import alone, distinct_plants, limited_rows, march_limited
-from omnidyn.simulation.batch.march import TOTALS, Record, Rows, march_twist
 from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters, in_blocks, out_of_blocks
 from omnidyn.simulation.batch.pose import gauss_four, march_pose, pose_law
 from omnidyn.simulation.batch.threads import Threads
@@ -104,7 +104,7 @@ class Keeping:
             history[0] = states[:, :rows].swapaxes(0, 1).reshape(rows, -1)
         totals = np.zeros((blocks if statistics else 0, TOTALS * rows, WIDTH))
         self.fails = np.where(failed, 0, np.iinfo(np.int64).max)
-        self.record = Record(every, history, totals)
+        self.record = KeptSamples(every, history, totals)
 
     def without_bad(self, rows: FloatArray, first: int, last: int) -> FloatArray:
         """Rows of commands of some robots, (robots, steps, wheels), zeros in place of what is not finite.
@@ -277,7 +277,7 @@ class BlockGroup:
 
         def march(span: tuple[int, int]) -> None:
             volts = self._own_volts(commands, span, keeping, clipped) if shared is None else shared
-            moving = Rows(volts, self._states, keeping.fails, self._fresh)
+            moving = BlockRows(volts, self._states, keeping.fails, self._fresh)
             room = () if self._plants is None else (alone(*self._plants),)
             self._march(*span, self._laws, moving, keeping.record, *self._rule, *room)
 

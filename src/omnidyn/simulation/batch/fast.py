@@ -19,17 +19,7 @@ from numpy.typing import NDArray
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import inlined, kernel
-from omnidyn.simulation.batch.exact import (
-    BREAKAWAY,
-    COULOMB,
-    PER_VOLT,
-    PHI,
-    RATE,
-    exact_law,
-    put_drive,
-    put_shared_drive,
-)
-from omnidyn.simulation.batch.march import (
+from omnidyn.simulation.batch.block_march import (
     DRIVE,
     POSE,
     SPEED,
@@ -42,6 +32,16 @@ from omnidyn.simulation.batch.march import (
     spoil,
     store,
     whole_steps,
+)
+from omnidyn.simulation.batch.exact import (
+    BREAKAWAY,
+    COULOMB,
+    PER_VOLT,
+    PHI,
+    RATE,
+    exact_law,
+    put_drive,
+    put_shared_drive,
 )
 from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters
 from omnidyn.simulation.exact.step import course, exact_step

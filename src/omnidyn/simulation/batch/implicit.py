@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import inlined, kernel, part
-from omnidyn.simulation.batch.march import (
+from omnidyn.simulation.batch.block_march import (
     DRIVE,
     POSE,
     SPEED,
@@ -41,7 +41,7 @@ from omnidyn.simulation.batch.march import (
 )
 from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters
 from omnidyn.simulation.batch.pose import ALONE, DX, DY, END, HALF, NODE, ONE, SERIES, SHARE, TURN, move_on, rotation
-from omnidyn.simulation.exact.march import PIECE
+from omnidyn.simulation.exact.exact_march import PIECE
 from omnidyn.simulation.implicit.step import BACK, GAMMA
 
 LAW = SHARE + 1  # rows of `work`, after those of pose.py

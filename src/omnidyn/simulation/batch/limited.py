@@ -21,8 +21,7 @@ from omnidyn.model.dynamics import motor_wrench
 from omnidyn.model.layout import N_AXES, Plant, PlantState, Stage, many, new_stage, new_states
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
-from omnidyn.simulation.batch.implicit import BACKWARD, DAMPING, LAW, PUSH, advance_pose, put_push, put_stage
-from omnidyn.simulation.batch.march import (
+from omnidyn.simulation.batch.block_march import (
     SPEED,
     TOTALS,
     first_failure,
@@ -34,6 +33,7 @@ from omnidyn.simulation.batch.march import (
     store,
     whole_steps,
 )
+from omnidyn.simulation.batch.implicit import BACKWARD, DAMPING, LAW, PUSH, advance_pose, put_push, put_stage
 from omnidyn.simulation.batch.parameters import WIDTH
 from omnidyn.simulation.batch.pose import DT, END, NODE, SHARE
 from omnidyn.simulation.implicit.step import step

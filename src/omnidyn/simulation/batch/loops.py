@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.kernel import inlined, kernel
 from omnidyn.model.robot import Robot
+from omnidyn.simulation.batch.block_march import POSE, SPEED, TOTALS, first_failure, keep, load, spoil, store
 from omnidyn.simulation.batch.blocks import (
     IMPLICIT_NAME,
     VOLTS_AT_ONCE,
@@ -26,9 +27,8 @@ from omnidyn.simulation.batch.blocks import (
     put_states,
     shown,
 )
-from omnidyn.simulation.batch.choice import BOX
+from omnidyn.simulation.batch.engine_kind import BOX
 from omnidyn.simulation.batch.implicit import implicit_law, put_push, stages, step_all, with_share
-from omnidyn.simulation.batch.march import POSE, SPEED, TOTALS, first_failure, keep, load, spoil, store
 from omnidyn.simulation.batch.parameters import WIDTH, batch_parameters, in_blocks
 from omnidyn.simulation.batch.pose import ONE, SHARE
 from omnidyn.simulation.batch.threads import Threads
@@ -198,7 +198,7 @@ class LoopGroup:
         self._failed, run = keeping.end(self._states, self.count)
         return run
 
-    def _grid(self, steps: int) -> tuple[Grid, IntArray]:
+    def _grid(self, steps: int) -> tuple[TickGrid, IntArray]:
         """The pieces of rows for all clocks and times of reset, and which of them each robot has."""
         both = np.stack([self._clock, self._done], axis=1)
         kinds, place = np.unique(both, axis=0, return_inverse=True)
@@ -211,7 +211,7 @@ class LoopGroup:
         for k, (lengths, tick, row, begins) in enumerate(cuts):
             here = np.arange(begins[-1]) + np.repeat(first[:-1] - begins[:-1], np.diff(begins))
             share[k, here], ticks[k, here], index[k, here] = lengths, tick, row
-        return Grid(share, ticks, index, first[1:] - 1), place.reshape(-1)
+        return TickGrid(share, ticks, index, first[1:] - 1), place.reshape(-1)
 
     def _cut(self, robot: Robot, done: int, steps: int) -> tuple[FloatArray, BoolArray, IntArray, IntArray]:
         """(shares, ticks, which of the commands acts, counted in `known`) of pieces, and where each row begins."""
@@ -222,7 +222,7 @@ class LoopGroup:
         row = np.floor((start - robot.drive.latency) / dt + SAME_TIME).astype(np.int64)
         return np.round(lengths / dt, 12), tick, np.maximum(row + self._kept, 0), begins
 
-    def _pieces(self, grid: Grid, place: IntArray, known: FloatArray, span: tuple[int, int]) -> Pieces:
+    def _pieces(self, grid: TickGrid, place: IntArray, known: FloatArray, span: tuple[int, int]) -> Pieces:
         """What the kernel takes, of some blocks."""
         lanes = np.minimum(np.arange(span[0] * WIDTH, span[1] * WIDTH), self.count - 1)
         mixed, blocks = len(grid.command) > 1, span[1] - span[0]
@@ -240,7 +240,7 @@ class LoopGroup:
         )
 
 
-class Grid(NamedTuple):
+class TickGrid(NamedTuple):
     """Pieces of rows, shape (kinds of clocks, pieces): lengths as shares of dt, whether the loop ticks, and which
     command acts. row_ends (rows,): the last piece of each row."""
 

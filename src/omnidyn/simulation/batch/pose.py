@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import inlined, kernel, part
-from omnidyn.simulation.batch.exact import BREAKAWAY, COULOMB, PHI, RATE, exact_law, put_drive, put_shared_drive
-from omnidyn.simulation.batch.march import (
+from omnidyn.simulation.batch.block_march import (
     DRIVE,
     POSE,
     SPEED,
@@ -31,8 +30,9 @@ from omnidyn.simulation.batch.march import (
     store,
     whole_steps,
 )
+from omnidyn.simulation.batch.exact import BREAKAWAY, COULOMB, PHI, RATE, exact_law, put_drive, put_shared_drive
 from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters
-from omnidyn.simulation.exact.march import MAX_TURN_PER_STEP, NODES, PIECE, WEIGHTS, travel, turning
+from omnidyn.simulation.exact.exact_march import MAX_TURN_PER_STEP, NODES, PIECE, WEIGHTS, travel, turning
 from omnidyn.simulation.exact.step import course, exact_step, pieces, turned_within
 
 # Rows of `work`: speeds at a node and at the end of a step, displacement and turn, f of yaw, how fast the step goes;

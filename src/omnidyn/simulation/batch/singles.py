@@ -14,7 +14,7 @@ from omnidyn.model.motor import DUTY as DUTY_DRIVE
 from omnidyn.model.motor import VOLTAGE as VOLTAGE_DRIVE
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.batch.blocks import BatchCommands, GroupRun
-from omnidyn.simulation.batch.choice import DUTY, VOLTAGE
+from omnidyn.simulation.batch.engine_kind import DUTY, VOLTAGE
 from omnidyn.simulation.batch.threads import Threads
 from omnidyn.simulation.live import LiveRobot
 from omnidyn.statement import Statement

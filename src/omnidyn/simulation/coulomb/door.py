@@ -22,9 +22,9 @@ from omnidyn.simulation.coulomb.law import (
     wheels_of,
 )
 from omnidyn.simulation.coulomb.run import run_loop, run_rows
-from omnidyn.simulation.coulomb.state import Law, Loop, Rows, Seen, empty_seen, new_work
-from omnidyn.simulation.speed_loop import LoopCommands
-from omnidyn.simulation.way import SAME_TIME
+from omnidyn.simulation.coulomb.state import ForceRows, Law, Loop, Seen, empty_seen, new_work
+from omnidyn.simulation.speed_loop import LoopSettings
+from omnidyn.simulation.travel import SAME_TIME
 
 MEMORY_BOUNDS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its memory, within these bounds
 SAME_SHARE = 0.1  # of the shortest row: times nearer than this are one, or than SAME_TIME
@@ -152,7 +152,7 @@ def run(
             dtwist[:, k] = start
     seen = empty_seen(t, late, min(SAME_TIME, SAME_SHARE * float(dt.min())), np.asarray(order, np.int64), len(way))
     volts = np.ascontiguousarray(voltage[:, : bound.shape[1]])
-    held = Rows(np.ascontiguousarray(dt), np.ascontiguousarray(force), dforce, volts, dvolts, bound)
+    held = ForceRows(np.ascontiguousarray(dt), np.ascontiguousarray(force), dforce, volts, dvolts, bound)
     limit = _most_steps(dt, tol)
     _refuse_run_away(run_rows(law, held, new_work(twist, way, dtwist), step, tol, limit, seen), dt, tol, limit)
     return seen
@@ -172,7 +172,7 @@ def run_looped(
     robot: Moved,
     gains: FloatArray,
     dgains: FloatArray,
-    loop: LoopCommands,
+    loop: LoopSettings,
     before: FloatArray,
     t: FloatArray,
     dt: FloatArray,

@@ -6,7 +6,7 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.simulation.coulomb.step import A21, B1, B2, GAMMA, begin_rate, end_drate
-from omnidyn.simulation.way import PATH, PLACE, TURN
+from omnidyn.simulation.travel import PATH, PLACE, TURN
 
 
 @part

@@ -52,7 +52,7 @@ class Law(NamedTuple):
         return self._replace(value=self.value.copy(), change=self.change.copy(), side=self.side.copy())
 
 
-class Rows(NamedTuple):
+class ForceRows(NamedTuple):
     """Forces held over rows [N, N, N m], and their derivatives; with limits those that are not of the motors."""
 
     dt: FloatArray  # (rows,)

@@ -34,8 +34,8 @@ from omnidyn.simulation.environments.layout import (
     SAME_STEP,
     VELOCITY,
     Buffers,
-    Numbers,
-    State,
+    EnvironmentState,
+    FixedNumbers,
     W,
     columns_of,
     new_state,
@@ -187,7 +187,7 @@ class Environments:
         self._threads = ThreadPoolExecutor(len(self._parts) - 1) if len(self._parts) > 1 else None
         self._now, self.was_reset = 0, False
 
-    def _numbers(self, robot: Robot, path: FloatArray | None) -> Numbers:
+    def _numbers(self, robot: Robot, path: FloatArray | None) -> FixedNumbers:
         """What a step needs to know."""
         setting, kind = self.setting, self.dtype.type
         sensors = robot.sensor_model.in_steps(setting.dt)
@@ -211,7 +211,7 @@ class Environments:
         if interval == 0 and self.pool.sizes[2] > 1:
             raise InputError("no interval for a range", got="interval=None", expected="seconds", where="interval")
         spread = SPREAD[setting.task] if setting.spread is None else setting.spread
-        return Numbers(
+        return FixedNumbers(
             task,
             AUTORESET[self.autoreset],
             setting.substeps,
@@ -357,4 +357,4 @@ class Environments:
             self._threads.shutdown()
 
 
-__all__ = ["W", "Environments", "Setting", "State", "Step"]
+__all__ = ["W", "EnvironmentState", "Environments", "Setting", "Step"]

@@ -29,7 +29,7 @@ GOAL, START, MEMBER = 0, 4, 8
 LATER, PER_INTERVAL, AGAIN = 16, 4, 3  # from LATER on for every interval a push of 3, and a member
 
 
-class Numbers(NamedTuple):
+class FixedNumbers(NamedTuple):
     """What does not change from step to step.
 
     task, autoreset: as above. substeps: of a piece; halves: 2 of each with poses, or 1, a number per piece. limit:
@@ -68,7 +68,7 @@ class Numbers(NamedTuple):
     dt: float
 
 
-class State(NamedTuple):
+class EnvironmentState(NamedTuple):
     """What changes. robots: their numbers, (blocks, rows, W). twist, pose, goal, push, mean: (blocks, 3, W).
 
     past: actions of steps before, (blocks, lags, wheels, W); places: poses of these, (blocks, steps, 3, W). count,
@@ -108,7 +108,7 @@ def columns_of(task: int, wheels: int) -> int:
     return (6, 7, 6 + 3 * len(PREVIEW))[task] + wheels
 
 
-def new_state(numbers: Numbers, robots: int, wheels: int) -> State:
+def new_state(numbers: FixedNumbers, robots: int, wheels: int) -> EnvironmentState:
     """A state for so many robots, whose blocks are whole; nobody has begun yet."""
     blocks, dtype = -(-robots // W), numbers.pool.dtype
     three = [np.zeros((blocks, 3, W), dtype) for _ in range(5)]
@@ -116,4 +116,6 @@ def new_state(numbers: Numbers, robots: int, wheels: int) -> State:
     places = np.zeros((blocks, max(1, numbers.late + numbers.hold), 3, W), dtype)
     counts = [np.zeros((blocks, W), np.int32) for _ in range(4)]
     marks = np.zeros((blocks, W), np.uint32), np.zeros((blocks, W), np.uint8), np.zeros(blocks, np.uint8)
-    return State._make([np.zeros((blocks, numbers.pool.shape[1], W), dtype), *three, past, places, *counts, *marks])
+    return EnvironmentState._make(
+        [np.zeros((blocks, numbers.pool.shape[1], W), dtype), *three, past, places, *counts, *marks]
+    )

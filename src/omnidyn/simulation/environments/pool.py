@@ -21,10 +21,10 @@ from omnidyn.model.known.uncertainty import plausible
 from omnidyn.model.motor import DUTY, DYNAMIC, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
-from omnidyn.simulation.batch.choice import BOX, DIRECTION, EXACT, VOLTAGE, engine_kind
+from omnidyn.simulation.batch.engine_kind import BOX, DIRECTION, EXACT, VOLTAGE, engine_kind
 from omnidyn.simulation.batch.parameters import BatchParameters, batch_parameters
 from omnidyn.simulation.environments.layout import BOX_LAW, DIRECTION_LAW, EXACT_LAW
-from omnidyn.simulation.exact.march import why_not_exact
+from omnidyn.simulation.exact.exact_march import why_not_exact
 
 STARTUP, RESET, INTERVAL = WHEN = "startup", "reset", "interval"
 ABS, SCALE, ADD = HOW = "abs", "scale", "add"

@@ -5,9 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.compiled.kernel import inlined, kernel, part
+from omnidyn.simulation.batch.block_march import POSE
 from omnidyn.simulation.batch.implicit import LAW, TURNING
-from omnidyn.simulation.batch.march import POSE
 from omnidyn.simulation.batch.pose import SHARE
+from omnidyn.simulation.environments.block_motion import (
+    add_push,
+    copy_row,
+    copy_rows,
+    face,
+    first_gain,
+    phi_of,
+    put_drive,
+    slide,
+    travel,
+)
 from omnidyn.simulation.environments.draws import draw, robot_key, uniform
 from omnidyn.simulation.environments.layout import (
     AGAIN,
@@ -23,17 +34,6 @@ from omnidyn.simulation.environments.layout import (
     SAME_STEP,
     START,
     W,
-)
-from omnidyn.simulation.environments.motion import (
-    add_push,
-    copy_row,
-    copy_rows,
-    face,
-    first_gain,
-    phi_of,
-    put_drive,
-    slide,
-    travel,
 )
 from omnidyn.simulation.environments.task import put_observation, put_reward
 

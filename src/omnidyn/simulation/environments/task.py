@@ -20,8 +20,8 @@ import math
 import numpy as np
 
 from omnidyn.compiled.kernel import inlined, part
+from omnidyn.simulation.environments.block_motion import copy_row
 from omnidyn.simulation.environments.layout import PATH, POSE, PREVIEW, VELOCITY, W
-from omnidyn.simulation.environments.motion import copy_row
 
 ARM = 0.1  # [m]
 NEAR_PLACE, NEAR_HEADING, NEAR_SPEED = 0.02, 0.05, 0.05  # [m], [rad], [m/s] and, per ARM, [rad/s]

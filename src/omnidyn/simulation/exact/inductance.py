@@ -1,6 +1,6 @@
 """The paper's law with winding inductance, exact: L di/dt of eq (11) kept, twist, currents and pose between events.
 
-It serves the robots of march.py whose motors also have equal inductances. Each body axis is a 2x2 linear system
+It serves the robots of exact_march.py whose motors also have equal inductances. Each body axis is a 2x2 linear system
 (inductance_step.py), moved by what stands below. The currents that drive an axis are the acceleration
 f of that axis, seen from the motors; the rest of n > 3 currents drives nothing and settles by itself: L i' = u - R i.
 """
@@ -18,6 +18,13 @@ from omnidyn.errors import InputError
 from omnidyn.model.dynamics import drive_wrench, state_space, wrench_from_currents
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
+from omnidyn.simulation.exact.exact_march import (
+    SETTLED_EXPONENT,
+    drive_acceleration,
+    put_next_pose,
+    refuse_spin,
+    rotated,
+)
 from omnidyn.simulation.exact.inductance_step import (
     forces,
     half_period,
@@ -28,7 +35,6 @@ from omnidyn.simulation.exact.inductance_step import (
     settled,
     slid,
 )
-from omnidyn.simulation.exact.march import SETTLED_EXPONENT, drive_acceleration, put_next_pose, refuse_spin, rotated
 
 MAX_EVENTS = 100_000  # of one axis in one step: an axis that sticks and slips that often is chattering
 

@@ -2,7 +2,7 @@
 
     d = integral over the step of R(theta(t)) (v_x(t), v_y(t)) dt,   theta the angle turned since its start
 
-in the body frame at the start of the step, by the quadrature of march.py. What an argument changes:
+in the body frame at the start of the step, by the quadrature of exact_march.py. What an argument changes:
 
     d d = integral of R(theta) (d v_x, d v_y) + R'(theta) (v_x, v_y) d theta
 
@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.simulation.exact.march import NODES, WEIGHTS, next_cut, rotated, turning
+from omnidyn.simulation.exact.exact_march import NODES, WEIGHTS, next_cut, rotated, turning
 from omnidyn.simulation.exact.slopes import hold_slopes, step_slopes, travel_slopes
 from omnidyn.simulation.exact.step import pieces as pieces_of
 

@@ -1,1 +1,1 @@
-"""Every other law: one implicit step (step) whose stages are inclusions, and a run of them (march)."""
+"""Every other law: one implicit step (step) whose stages are inclusions, and a run of them (implicit_march)."""

@@ -33,7 +33,8 @@ from omnidyn.simulation.engine import (
     implicit_motion,
     named,
 )
-from omnidyn.simulation.implicit.march import capped
+from omnidyn.simulation.implicit.implicit_march import capped
+from omnidyn.simulation.sensitivity.derivative_march import run_loop_with_derivatives, run_with_derivatives
 from omnidyn.simulation.sensitivity.directions import (
     EPS,
     Prepared,
@@ -45,11 +46,10 @@ from omnidyn.simulation.sensitivity.directions import (
     width,
 )
 from omnidyn.simulation.sensitivity.late_sample import passed_on
-from omnidyn.simulation.sensitivity.march import run_loop_with_derivatives, run_with_derivatives
 from omnidyn.simulation.simulate import as_run
 from omnidyn.simulation.speed_loop import loop_of
+from omnidyn.simulation.travel import PATH
 from omnidyn.simulation.view import seen_at_once
-from omnidyn.simulation.way import PATH
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from omnidyn.model.stick_slip.active_set import find_active_set, newton_directio
 from omnidyn.model.stick_slip.forces import aim_bristles, forces_at_work, residual, set_losses, winding
 from omnidyn.model.stick_slip.plant import copy_state, copy_table, signs_differ
 from omnidyn.model.stick_slip.release import put, settle, sticks
-from omnidyn.simulation.implicit.march import SHORTEST_STEP
+from omnidyn.simulation.implicit.implicit_march import SHORTEST_STEP
 from omnidyn.simulation.implicit.step import step
 from omnidyn.simulation.sensitivity.directions import EPS
 from omnidyn.simulation.sensitivity.stage import stage_derivatives, step_with_derivatives

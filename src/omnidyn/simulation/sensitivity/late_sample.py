@@ -27,7 +27,8 @@ from omnidyn.simulation.coulomb.door import run as run_coulomb
 from omnidyn.simulation.engine import (
     as_tolerance,
 )
-from omnidyn.simulation.implicit.march import capped
+from omnidyn.simulation.implicit.implicit_march import capped
+from omnidyn.simulation.sensitivity.derivative_march import run_loop_with_derivatives, run_with_derivatives
 from omnidyn.simulation.sensitivity.directions import (
     EPS,
     current_derivatives,
@@ -38,10 +39,9 @@ from omnidyn.simulation.sensitivity.directions import (
     refuse_switched_off,
     width,
 )
-from omnidyn.simulation.sensitivity.march import run_loop_with_derivatives, run_with_derivatives
 from omnidyn.simulation.sensitivity.sample import Samples, empty_samples
 from omnidyn.simulation.speed_loop import loop_of
-from omnidyn.simulation.way import PATH, SAME_TIME, TURN
+from omnidyn.simulation.travel import PATH, SAME_TIME, TURN
 
 PIECES, ROUGH_TOLERANCE = 16, 1e-3  # steps in a row, at most; [m/s] the tolerance where they were more
 PATH_AND_TURN = [1, 2, 0]  # of the way, in the order of a twist

@@ -24,7 +24,7 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.stick_slip.plant import copy_row, copy_table
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS
-from omnidyn.simulation.way import PATH, PLACE, SAME_TIME, TURN
+from omnidyn.simulation.travel import PATH, PLACE, SAME_TIME, TURN
 
 
 class Samples(NamedTuple):

@@ -21,8 +21,8 @@ from omnidyn.model.robot import Robot
 from omnidyn.simulation.commands import Commands, current_bounds
 from omnidyn.simulation.sensitivity.directions import EPS, difference
 from omnidyn.simulation.sensitivity.late_sample import Direction, VoltageProgram, held
-from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant
+from omnidyn.simulation.slip.slip_march import rolling, run_slipping
 from omnidyn.simulation.speed_loop import no_loop
 
 A_MOMENT = 1e-4  # [s]

@@ -110,7 +110,7 @@ def growth(plant, lines, start, end, h):
 @part
 def reverses(plant, a, b, h):
     """A bound of how far currents that leave or meet 0 under a voltage drop can lead a step astray; see
-    implicit/march.py."""
+    implicit/implicit_march.py."""
     worst = 0.0
     for w in range(len(plant.spin)):
         record, i, j = plant.element[3 + w], a.each[3 + w].current, b.each[3 + w].current

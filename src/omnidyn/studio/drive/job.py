@@ -46,7 +46,7 @@ def as_measured(twist: FloatArray, seed: int) -> FloatArray:
     return twist + np.random.default_rng(seed).standard_normal(twist.shape) * NOISE
 
 
-class Drive:
+class DrivenRobot:
     """One robot on its way."""
 
     def __init__(
@@ -234,4 +234,4 @@ def drive(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, An
     """Drive a robot until the page stops it. request: "robot", "folder" of recorded logs."""
     robot = robot_of(request)
     assert robot is not None
-    return Drive(robot, Path(request["folder"]), tell, commands).run()
+    return DrivenRobot(robot, Path(request["folder"]), tell, commands).run()

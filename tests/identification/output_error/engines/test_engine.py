@@ -6,7 +6,7 @@ import pytest
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.engine import Weighting
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.kernel.march import FINAL
+from omnidyn.identification.output_error.kernel.march_sums import FINAL
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point, per_column
 from omnidyn.model.keys import Key

@@ -8,7 +8,7 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear.random_effects import RandomEffects, drawn_together
-from omnidyn.identification.output_error.linear.rows import Linear, Rows, noise_models
+from omnidyn.identification.output_error.linear.rows import FitRows, Linear, noise_models
 from omnidyn.identification.output_error.linear.sensitivity import effects
 from omnidyn.identification.output_error.memory.autoregression import _without_empty_axes
 from omnidyn.identification.output_error.problem import problem as module
@@ -85,7 +85,7 @@ def test_intervals_beside_a_bounded_diagnosis_are_those_of_all_rows(case, log, m
 
 def test_sums_over_pieces_are_those_of_all_rows_at_once(solution):
     point, problem = solution.state.point, solution.solver.problem
-    rows = Rows.of(problem, point, solution.solver.engine.residuals(point))
+    rows = FitRows.of(problem, point, solution.solver.engine.residuals(point))
     linear = Linear(rows, noise_models(rows, rows.residual))
     shown = [np.random.default_rng(k).normal(size=(*own.shape, 5)) for k, own in enumerate(rows.residual)]
     e, j = linear.whole()

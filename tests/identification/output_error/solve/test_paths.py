@@ -7,7 +7,7 @@ from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.first_point import RateEngine, coarse_point
+from omnidyn.identification.output_error.solve.first_point import Rates, coarse_point
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.model.first_guess import first_guess
@@ -71,7 +71,7 @@ def test_a_fit_of_counts_from_bad_guesses_finds_what_one_from_the_truth_does(see
 def test_a_rate_is_the_difference_from_the_last_row_that_was_measured():
     problem, true = problem_of(4, missing=(100, 101, 102))
     ((path, by_path, _),) = ImplicitEngine(problem).residuals(true)
-    ((rate, by_rate, _),) = RateEngine(problem).residuals(true)
+    ((rate, by_rate, _),) = Rates(ImplicitEngine(problem)).residuals(true)
     first = int(np.flatnonzero(np.isfinite(path[0]))[0])
     assert np.isnan(rate[0, [first, 100, 101, 102]]).all()
     assert rate[0, 103] == path[0, 103] - path[0, 99]

@@ -1,2 +1,2 @@
-"""The model in place of the robot: engine (the contract), exact, implicit, speed_loop; valley (where motors are
-guesses)."""
+"""The model in place of the robot: engine (the contract), exact, implicit, speed_loop, kinds (which of them has what a
+fit asks for); valley (where motors are guesses)."""

@@ -13,17 +13,26 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
-from omnidyn.identification.output_error.kernel.march import FINAL, WAVES, add_waves, terms_of
-from omnidyn.identification.output_error.problem.problem import Column, Fitted, Parts, Piece, PieceSums, Point, Problem
+from omnidyn.identification.output_error.kernel.march_sums import FINAL, WAVES, add_waves, terms_of
+from omnidyn.identification.output_error.problem.problem import (
+    Column,
+    FitProblem,
+    Parts,
+    Piece,
+    PieceSums,
+    Point,
+    Problem,
+)
 from omnidyn.model.actuation import Driver
 from omnidyn.model.layout import N_AXES
 
-P = TypeVar("P", bound=Fitted)
+P = TypeVar("P", bound=FitProblem)
 
 
 @dataclass(frozen=True)
 class Weighting:
-    """variance (columns,) by Problem.columns; nu of Student's t, 0 for Gauss; mode and block as in kernel/march.py.
+    """variance (columns,) by Problem.columns; nu of Student's t, 0 for Gauss; mode and block as in
+    kernel/march_sums.py.
 
     counts_ticks: whether counts are taken as such, or like any other output.
     """
@@ -35,7 +44,7 @@ class Weighting:
     counts_ticks: bool = False
 
 
-class Engine(Generic[P]):
+class FitEngine(Generic[P]):
     """What simulates a problem with its derivatives. A new one:
 
     1. gives `residuals`, or `sums` where rows need not be held, and `on`;
@@ -55,7 +64,7 @@ class Engine(Generic[P]):
     members: Sequence[Any] = ()
 
     @classmethod
-    def of(cls, problem: P, tol: float | None = None) -> Engine[P]:
+    def of(cls, problem: P, tol: float | None = None) -> FitEngine[P]:
         """The engine of this kind that serves a problem. tol [m/s]: of the steps of one that is not exact."""
         raise NotImplementedError
 
@@ -73,7 +82,7 @@ class Engine(Generic[P]):
         return self.residuals(point)
 
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
-        """What the residuals of every piece add up to; see kernel/march.py."""
+        """What the residuals of every piece add up to; see kernel/march_sums.py."""
         columns, count = self.problem.columns, len(self.problem.parameters)
         return [
             added(piece, columns, parts, weighting, count)
@@ -85,7 +94,7 @@ class Engine(Generic[P]):
         return step
 
     @property
-    def unfiltered(self) -> Engine[P]:
+    def unfiltered(self) -> FitEngine[P]:
         """The engine that simulates, whose rows are as they are."""
         return self
 
@@ -104,7 +113,7 @@ class Engine(Generic[P]):
 
 
 def added(piece: Piece, all_columns: tuple[Column, ...], parts: Parts, weighting: Weighting, count: int) -> PieceSums:
-    """The sums of kernel/march.py for a piece of a problem with the columns `all_columns` and `count` parameters.
+    """The sums of kernel/march_sums.py for a piece of a problem with the columns `all_columns` and `count` parameters.
 
     parts: residuals (C, rows), slopes (C, rows, U) and (U,) the index of each slope among the parameters and states.
     """
@@ -177,7 +186,7 @@ def late_by(problem: Problem, values: FloatArray, columns: Sequence[Column]) -> 
 
 @kernel
 def row_terms(residual, variance, nu, tick, share, final):
-    """(w r, w r^2, curvature, rho) of every residual (C, rows), see kernel/march.py; 0 where it is NaN."""
+    """(w r, w r^2, curvature, rho) of every residual (C, rows), see kernel/march_sums.py; 0 where it is NaN."""
     columns, rows = residual.shape
     terms = np.zeros((4, columns, rows))
     for c in range(columns):

@@ -8,19 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.engines.engine import Engine, Weighting, driver_of, late_by
+from omnidyn.identification.output_error.engines.engine import FitEngine, Weighting, driver_of, late_by
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
-from omnidyn.identification.output_error.kernel.march import (
-    FINAL,
-    KEEP,
-    PATH,
-    WAVES,
-    Loss,
-    Physics,
-    PhysicsSlopes,
-    Sums,
-    march,
-)
 from omnidyn.identification.output_error.kernel.march_axis import (
     GRAD,
     LAG,
@@ -31,6 +20,17 @@ from omnidyn.identification.output_error.kernel.march_axis import (
     SQUARE,
     march_axis,
     spread,
+)
+from omnidyn.identification.output_error.kernel.march_sums import (
+    FINAL,
+    KEEP,
+    PATH,
+    WAVES,
+    Loss,
+    Physics,
+    PhysicsSlopes,
+    Sums,
+    march,
 )
 from omnidyn.identification.output_error.kernel.pull import Room
 from omnidyn.identification.output_error.problem.heading import facing_at_start, headings, in_the_body
@@ -48,7 +48,7 @@ PUSH = ("push.x", "push.y", "push.yaw")  # constant in the body
 TILT = ("tilt.x", "tilt.y")  # constant in the room
 
 
-class ExactEngine(Engine[Problem]):
+class ExactEngine(FitEngine[Problem]):
     """Residuals and sensitivities of a problem by the exact step.
 
     fast: whether the march of kernel/march_axis.py may serve where it can.

@@ -17,7 +17,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import side_by_side
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX, Engine, driver_of, late_by
+from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX, FitEngine, driver_of, late_by
 from omnidyn.identification.output_error.engines.exact import HEADING, POSITION, PUSH, TILT
 from omnidyn.identification.output_error.engines.valley import bent
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
@@ -37,7 +37,7 @@ from omnidyn.simulation.sensitivity.late_sample import (
     late_samples,
 )
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
-from omnidyn.simulation.way import PATH, PLACE, TURN
+from omnidyn.simulation.travel import PATH, PLACE, TURN
 from omnidyn.statistics import difference_noise
 
 PATH_TOLERANCES = (1e-6, 1e-4)  # [m/s] where a path is fitted, and what a speed is off by adds up
@@ -101,7 +101,7 @@ class LastPoints:
         return parts_by_piece
 
 
-class ImplicitEngine(Engine[Problem]):
+class ImplicitEngine(FitEngine[Problem]):
     """Residuals and sensitivities of a problem by the implicit engine. tol [m/s]: its tolerance, None a step a row.
 
     A force that stays in the room is turned by the headings of the log. pushes: whether it knows such forces, and those

@@ -1,4 +1,4 @@
-"""The march of march.py for the most common fit, ten times as fast: friction of the axes from measured twists.
+"""The march of march_sums.py for the most common fit, ten times as fast: friction of the axes from measured twists.
 
 Nothing but the rate a, the level c and the start of an axis changes there, and each axis moves for itself: three
 slopes in registers instead of rows.
@@ -10,7 +10,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel
-from omnidyn.identification.output_error.kernel.march import FINAL, STEP_TOLERANCE, loss_terms
+from omnidyn.identification.output_error.kernel.march_sums import FINAL, STEP_TOLERANCE, loss_terms
 from omnidyn.simulation.exact.slopes import hold_slopes, step_slopes
 
 SLOPE_COUNT = 3  # slopes: by a, by c, by the speed at the start
@@ -20,7 +20,7 @@ NUMBER, SQUARE, LOSS, LAG, GRAD, INFO, SIZE = 0, 1, 2, 3, 4, 7, 13
 
 @kernel
 def march_axis(t, u, y, axis, first, last, drive, rate, coulomb, hold, start, variance, nu, block, mode, sums, scores):
-    """Add to `sums` (SIZE,) what column `axis` of y says, over rows first..last. Arguments as in march.py.
+    """Add to `sums` (SIZE,) what column `axis` of y says, over rows first..last. Arguments as in march_sums.py.
 
     scores (blocks, SLOPE_COUNT + 1), filled in a final march: by a, by c, by the start, and
     the drift. drive (W,): acceleration per volt of this axis; rate, coulomb, hold, start: of this axis.

@@ -7,8 +7,8 @@ stretch makes them worse. So each of which the likelihood is sure is asked for t
 one linear step from the fit to all, as in ladder/held_out.py.
 
 In doubt a nuisance stays: one that is there and not fitted moves friction by 10 to 40 %, past every interval, and one
-that is fitted and not there costs what the intervals say. It must go where leaving it out lowers the error of those
-blocks by more than its standard error. A gain always stays: a supply that is only nominal is in the intervals by it.
+that is fitted and not there costs what the intervals say. It must go where those blocks are predicted better without
+it (`compare_blocks`). A gain always stays: a supply that is only nominal is in the intervals by it.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.linear.rows import (
     EIGEN_TOLERANCE,
+    FitRows,
     Linear,
-    Rows,
     lengths,
     noise_models,
     with_priors,
@@ -31,13 +31,14 @@ from omnidyn.identification.output_error.linear.rows import (
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Normal, Solution
+from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 from omnidyn.model.actuation import DEAD_BAND
 
 BLOCKS = 10  # of the log, each held out once
 NUISANCE_GAIN = 10.8  # what a likelihood that is sure of a nuisance gains by it: 2 F, by chance once in a thousand logs
 
 
-class Blocks:
+class BlockProducts:
     """Scalar products of [e, J, Z] in blocks of rows. matrix (B, n, n); shows (n,): which columns are not all 0."""
 
     def __init__(self, linear: Linear, *extra_columns: Sequence[FloatArray]):
@@ -59,7 +60,7 @@ class Blocks:
         self.matrix /= np.outer(self.size, self.size)
         self.total /= np.outer(self.size, self.size)
 
-    def of(self, matrix: FloatArray, total: FloatArray) -> Blocks:
+    def of(self, matrix: FloatArray, total: FloatArray) -> BlockProducts:
         """Blocks with other scalar products, of the same rows."""
         other_blocks = copy.copy(self)
         other_blocks.matrix, other_blocks.total = matrix, total
@@ -108,22 +109,22 @@ class Blocks:
         return self.held_out(indices)
 
 
-def rejected_nuisances(solution: Solution) -> tuple[str, ...]:
-    """The names of the latencies and the dead band that a fit is sure of, and blocks beside it are better without."""
+def rejected_nuisances(solution: Solution) -> dict[str, BlockComparison]:
+    """The latencies and the dead band that a fit is sure of, and held-out blocks are better without; how they are."""
     steps = _steps(solution)
     if not steps:
-        return ()
+        return {}
     blocks, problem = _blocks(solution), solution.solver.problem
     indices = 1 + np.flatnonzero(~solution.held_parameters)
-    lost: list[int] = []
+    rejected: dict[str, BlockComparison] = {}
     while steps:
-        harm_by_number = {j: _harm(blocks, indices, j, step) for j, step in steps.items()}
-        most_harmful = max(harm_by_number, key=lambda j: harm_by_number[j])
-        if harm_by_number[most_harmful] <= 1.0:
+        comparisons = {j: _without_it(blocks, indices, j, step) for j, step in steps.items()}
+        most_harmful = min(comparisons, key=lambda j: comparisons[j].p)
+        if not comparisons[most_harmful].is_better:
             break
         blocks, indices = _without(blocks, most_harmful, steps.pop(most_harmful)), indices[indices != 1 + most_harmful]
-        lost.append(most_harmful)
-    return tuple(problem.parameters[j].name for j in lost)
+        rejected[problem.parameters[most_harmful].name] = comparisons[most_harmful]
+    return rejected
 
 
 def _steps(solution: Solution) -> dict[int, float]:
@@ -142,27 +143,26 @@ def _steps(solution: Solution) -> dict[int, float]:
     return steps_by_number
 
 
-def _blocks(solution: Solution) -> Blocks:
+def _blocks(solution: Solution) -> BlockProducts:
     """The fit in blocks of white rows."""
     full_problem = solution.solver.problem
     assert isinstance(full_problem, Problem)
     problem = bounded(full_problem)
     engine = solution.solver.engine.on(problem)
-    rows = Rows.of(problem, solution.state.point, engine.residuals(solution.state.point))
+    rows = FitRows.of(problem, solution.state.point, engine.residuals(solution.state.point))
     slopes = [
         np.where(solution.held_parameters, 0.0, slope) for slope in rows.slopes
     ]  # what a bound holds, holds in every block
     linear = Linear(replace(rows, slopes=slopes), noise_models(rows, rows.residual))
-    return Blocks(linear, [np.zeros((*residual.shape, 0)) for residual in rows.residual])
+    return BlockProducts(linear, [np.zeros((*residual.shape, 0)) for residual in rows.residual])
 
 
-def _harm(blocks: Blocks, indices: IntArray, j: int, step: float) -> float:
-    """By how many standard errors the error of blocks that are left out is lower without number j."""
-    change = blocks.held_out(indices) - _without(blocks, j, step).held_out(indices[indices != 1 + j])
-    return float(change.sum() / max(change.std(ddof=1) * np.sqrt(len(change)), 1e-300))
+def _without_it(blocks: BlockProducts, indices: IntArray, j: int, step: float) -> BlockComparison:
+    """How held-out blocks are predicted without number j, beside with it."""
+    return compare_blocks(blocks.held_out(indices), _without(blocks, j, step).held_out(indices[indices != 1 + j]))
 
 
-def _without(blocks: Blocks, j: int, step: float) -> Blocks:
+def _without(blocks: BlockProducts, j: int, step: float) -> BlockProducts:
     """The same blocks where number j has taken this step."""
     turn = np.eye(len(blocks.size))
     turn[1 + j, 0] = -step * blocks.size[1 + j]

@@ -14,22 +14,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.linear.blocks import BLOCKS, Blocks
-from omnidyn.identification.output_error.linear.rows import Linear, Rows, noise_models
+from omnidyn.identification.output_error.linear.blocks import BLOCKS, BlockProducts
+from omnidyn.identification.output_error.linear.rows import FitRows, Linear, noise_models
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Point, Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 
-BETTER_ERRORS = 1.0  # standard errors of the difference by which one fit must predict better to be taken for another
-LEAST_GAIN = 0.1  # of the squared error, the same: 5 % of the error
+TAIL = 6  # blocks of the log, to which a fit is made that the rest of it is predicted by
 TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
 class FreeRun:
     """The error of a free run on held-out blocks. square (B, C): sums of squares of each block and output; rows (C,):
-    how many there are; spread (C,): standard deviation of each output.
+    how many there are; spread (C,): standard deviation of each output. tail (B - TAIL, C): as square, of the last
+    blocks by a fit to those before, which tells more of what comes after a log whose errors last long.
 
     Of what adds up, such as an angle, a block begins with the errors of all blocks before: it counts where nothing else
     was measured, and there adds_up is True.
@@ -39,6 +40,7 @@ class FreeRun:
     rows: FloatArray
     spread: FloatArray
     adds_up: bool = False
+    tail: FloatArray | None = None
 
     @property
     def error(self) -> float:
@@ -47,13 +49,24 @@ class FreeRun:
         share = np.sqrt(self.square.sum(axis=0)[seen_outputs] / self.rows[seen_outputs]) / self.spread[seen_outputs]
         return float(np.exp(np.log(np.maximum(share, TINY)).mean())) if seen_outputs.any() else np.nan
 
-    def is_better(self, reference: FreeRun) -> bool:
-        """Whether it predicts blocks clearly better than another: by the share of the squared error that it takes away,
-        the mean of all outputs, beyond BETTER_ERRORS standard errors of it."""
-        reference_squares = np.maximum(reference.square.sum(axis=0), TINY)
-        gain = ((reference.square - self.square) / reference_squares)[:, self.rows > 0.0].mean(axis=1)
-        spread = float(gain.std(ddof=1)) * np.sqrt(len(gain))
-        return bool(gain.sum() > max(BETTER_ERRORS * spread, LEAST_GAIN))
+    def improvement(self, reference: FreeRun) -> BlockComparison | None:
+        """How much better than another it predicts blocks, by their squared errors, each output over what the other
+        leaves; None where it is not clearly better."""
+        share = self._share(reference)
+        comparison = compare_blocks(reference.square @ share, self.square @ share)
+        return comparison if comparison.is_clear else None
+
+    def tail_improvement(self, reference: FreeRun) -> BlockComparison | None:
+        """How much better than another it predicts the tail of the logs; None where it is not clearly better."""
+        share = self._share(reference)
+        if self.tail is None or reference.tail is None:
+            return None
+        comparison = compare_blocks(reference.tail @ share, self.tail @ share)
+        return comparison if comparison.is_clear else None
+
+    def _share(self, reference: FreeRun) -> FloatArray:
+        """What a squared error of each output counts. Shape (C,)."""
+        return np.where(self.rows > 0.0, 1.0 / np.maximum(reference.square.sum(axis=0), TINY), 0.0)
 
 
 def free_run(
@@ -75,7 +88,7 @@ def free_run(
     pieces = [replace(piece, margin=margin) for piece, margin in zip(full_problem.pieces, margins, strict=True)]
     problem = bounded(replace(full_problem, pieces=tuple(pieces)))
     point = solution.state.point if values is None else Point(values, solution.state.point.states)
-    rows = Rows.of(problem, point, solution.solver.engine.unfiltered.on(problem).residuals(point))
+    rows = FitRows.of(problem, point, solution.solver.engine.unfiltered.on(problem).residuals(point))
     held_parameters = solution.held_parameters if values is None else np.ones(len(solution.held_parameters), bool)
     rows = replace(rows, slopes=[np.where(held_parameters, 0.0, slopes) for slopes in rows.slopes])
     white = noise_models(rows, rows.residual, order_limit=0)
@@ -85,22 +98,28 @@ def free_run(
     white_rows = Linear(rows, white)
     residual, slopes = white_rows.whole()
     number, column = _places(white_rows)
-    steps = np.zeros((BLOCKS, slopes.shape[1]))
+    steps, tail_step = np.zeros((BLOCKS, slopes.shape[1])), np.zeros(slopes.shape[1])
     indices = 1 + np.flatnonzero(np.any(slopes != 0.0, axis=0))
     if indices.size:
-        blocks = Blocks(
+        blocks = BlockProducts(
             Linear(rows, models), [np.zeros((*column_residuals.shape, 0)) for column_residuals in rows.residual]
         )
         for b in range(BLOCKS):
             steps[b, indices - 1] = blocks.fitted(blocks.total - blocks.matrix[b], indices) / blocks.size[indices]
+        before = blocks.total - blocks.matrix[TAIL:].sum(axis=0)
+        tail_step[indices - 1] = blocks.fitted(before, indices) / blocks.size[indices]
     variance, square = np.array([model.variance for model in white]), np.zeros((BLOCKS, len(white)))
+    tail = np.zeros((BLOCKS - TAIL, len(white)))
     for b in range(BLOCKS):
         block = number == b
         block_residual = residual[block] - slopes[block] @ steps[b]
         square[b] = np.bincount(column[block], block_residual**2, len(white)) * variance
+        if b >= TAIL:
+            tail_residual = residual[block] - slopes[block] @ tail_step
+            tail[b - TAIL] = np.bincount(column[block], tail_residual**2, len(white)) * variance
     travels = np.array([name in TRAVELS for name, _ in problem.columns])
     count = np.where(travels & ~travels.all(), 0.0, rows.added(lambda k, j: rows.masks[k][j]))
-    return FreeRun(square, count, _spread(rows), bool(travels.all()))
+    return FreeRun(square, count, _spread(rows), bool(travels.all()), tail)
 
 
 def margins_of(solutions: Sequence[Solution]) -> list[FloatArray]:
@@ -117,10 +136,10 @@ def _places(linear: Linear) -> tuple[IntArray, IntArray]:
         column.append(np.concatenate([of_rows, np.full(linear.length(k) - len(of_rows), -1)]))
     column.append(np.full(len(rows.problem.parameters), -1))
     column_of_row = np.concatenate(column)
-    return np.where(column_of_row >= 0, Blocks.numbers(linear), -1), column_of_row
+    return np.where(column_of_row >= 0, BlockProducts.numbers(linear), -1), column_of_row
 
 
-def _spread(rows: Rows) -> FloatArray:
+def _spread(rows: FitRows) -> FloatArray:
     """Standard deviation of what was measured of each column in the rows that count. Shape (C,)."""
     values: list[list[FloatArray]] = [[] for _ in rows.problem.columns]
     for piece, mask, columns in zip(rows.pieces, rows.masks, rows.column, strict=True):

@@ -36,7 +36,7 @@ Shown = Sequence[FloatArray]  # of each piece: (C, rows, K)
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class FitRows:
     """The rows of a fit as they are: of each piece residuals (C, rows), and slopes (C, rows, P), (C, rows, S) of it.
 
     masks: of each piece (C, rows), which rows count; steps: of each column of each piece, rows since the one before.
@@ -58,7 +58,7 @@ class Rows:
     losses: list[int] = field(default_factory=list)
 
     @classmethod
-    def of(cls, problem: Problem, point: Point, parts: Sequence[Parts]) -> Rows:
+    def of(cls, problem: Problem, point: Point, parts: Sequence[Parts]) -> FitRows:
         """The rows that an engine shows at a point, by the numbers that the solver sees."""
         count, all_columns = len(problem.parameters), problem.columns
         scale = [p.slope(float(v)) for p, v in zip(problem.parameters, point.values, strict=True)]
@@ -111,7 +111,7 @@ class Rows:
 class Linear:
     """Rows made white. memory: of each column of the problem."""
 
-    rows: Rows
+    rows: FitRows
     memory: Sequence[AutoRegression]
 
     @cached_property
@@ -245,7 +245,7 @@ class Linear:
         return {}
 
     def squares(self, values: Sequence[FloatArray]) -> FloatArray:
-        """The same as of `Rows`, of values made white."""
+        """The same as of `FitRows`, of values made white."""
         return self.rows.added(lambda k, j: self.of_column(k, j, values[k][j][:, None]) ** 2)
 
     def without_starts(self, columns_by_piece: Shown) -> list[FloatArray]:
@@ -355,7 +355,7 @@ def root_of_covariance(columns: FloatArray) -> FloatArray:
 
 
 def noise_models(
-    rows: Rows,
+    rows: FitRows,
     residuals: Sequence[FloatArray],
     removed_columns: Sequence[FloatArray] | None = None,
     order_limit: int | None = None,

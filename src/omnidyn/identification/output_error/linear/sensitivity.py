@@ -11,16 +11,16 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.clocks import usual_step
 from omnidyn.errors import OmnidynError
-from omnidyn.identification.output_error.engines.engine import Engine
-from omnidyn.identification.output_error.linear.motion import Motion, motions
+from omnidyn.identification.output_error.engines.engine import FitEngine
+from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion, motions
 from omnidyn.identification.output_error.linear.random_effects import share
-from omnidyn.identification.output_error.linear.rows import Linear, Rows, lengths, solved, solved_by, with_priors
+from omnidyn.identification.output_error.linear.rows import FitRows, Linear, lengths, solved, solved_by, with_priors
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.problem.differences import COUNT_SHARE, GAP_ROWS, JUMP, UNEVEN
 from omnidyn.identification.output_error.problem.parameters import robot_parameter
-from omnidyn.identification.output_error.problem.problem import Fitted, Piece, Point, Problem, bounded
+from omnidyn.identification.output_error.problem.problem import FitProblem, Piece, Point, Problem, bounded
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.model.dynamics import drive_wrench, linear_part
@@ -61,13 +61,13 @@ def moved_by_the_file(weighed_fit: Weighed, stds_by_key: Mapping[str, float]) ->
     return shifts
 
 
-def as_weighed(weighed_fit: Weighed) -> tuple[Linear, Engine, Point]:
+def as_weighed(weighed_fit: Weighed) -> tuple[Linear, FitEngine, Point]:
     """(the rows of a fit made white by the memory that it was weighed with, what simulates them, its best point)."""
     solver, point = weighed_fit.plain_solution.solver, weighed_fit.plain_solution.state.point
     assert isinstance(solver.problem, Problem)
     problem, variance = bounded(solver.problem, 1), weighed_fit.plain_solution.state.variance
     engine = solver.engine.on(problem)
-    rows = Rows.of(problem, point, engine.residuals(point))
+    rows = FitRows.of(problem, point, engine.residuals(point))
     memory = [
         weighed_fit.models.get(column, AutoRegression(np.zeros(0), float(variance[c]), 0))
         for c, column in enumerate(problem.columns)
@@ -75,7 +75,7 @@ def as_weighed(weighed_fit: Weighed) -> tuple[Linear, Engine, Point]:
     return Linear(rows, memory), engine, point
 
 
-def members_of(engine: Engine, problem: Problem, point: Point) -> list[tuple[Problem, Point, Engine, IntArray]]:
+def members_of(engine: FitEngine, problem: Problem, point: Point) -> list[tuple[Problem, Point, FitEngine, IntArray]]:
     """(problem, point, engine, which pieces of all are its own) of each group; of one where there are none."""
     if not engine.members:
         return [(problem, point, engine, np.arange(len(problem.pieces)))]
@@ -145,7 +145,7 @@ def moved_by_rounding(weighed_fit: Weighed) -> FloatArray:
     )
 
 
-def with_rounding(rows: Rows, piece_motions: Sequence[Motion]) -> Rows:
+def with_rounding(rows: FitRows, piece_motions: Sequence[DrivenMotion]) -> FitRows:
     """The rows of a fit with what the rounding of inputs shows in them, where they are rounded; and what an input does
     that changed while rows are missing."""
     stretches_by_piece = [_stretches(motion.piece) for motion in piece_motions]
@@ -189,7 +189,7 @@ def _changed(inputs: FloatArray, w: int) -> BoolArray:
     return changes[:, w] | (other_changes.all(axis=1) & other_changes.any(axis=1))
 
 
-def _drawn(motion: Motion, random: np.random.Generator) -> FloatArray:
+def _drawn(motion: DrivenMotion, random: np.random.Generator) -> FloatArray:
     """Draws of what was rounded off [V], another one at each change of an input. Shape (rows, DRAWS, W)."""
     record, rows = motion.piece.record, slice(motion.piece.first, motion.piece.last + 1)
     inputs, steps = as_logged(record)[rows], input_steps(record)
@@ -200,7 +200,7 @@ def _drawn(motion: Motion, random: np.random.Generator) -> FloatArray:
     return draws * np.any(inputs, axis=1, keepdims=True)[:, :, None]  # what is off is off
 
 
-def _shown(motion: Motion, volts: FloatArray) -> FloatArray:
+def _shown(motion: DrivenMotion, volts: FloatArray) -> FloatArray:
     """What the columns show of other voltages (rows, K, W). Shape (C, rows, K)."""
     robot = linear_part(motion.robot)
     per_volt = drive_wrench(robot, np.zeros(N_AXES), np.eye(robot.wheels.count))
@@ -212,7 +212,7 @@ def _shown(motion: Motion, volts: FloatArray) -> FloatArray:
     return values
 
 
-def _rows(problem: Fitted) -> int:
+def _rows(problem: FitProblem) -> int:
     return sum(piece.last - piece.first + 1 for piece in problem.pieces)
 
 
@@ -248,7 +248,7 @@ def losses(piece: Piece) -> IntArray:
     return np.flatnonzero(jumps & (row > GAP_ROWS))
 
 
-def shown_by_losses(motion: Motion) -> FloatArray:
+def shown_by_losses(motion: DrivenMotion) -> FloatArray:
     """What the columns show of each input that changed at once, and of one that did halfway, times the root of the mean
     square of u. (C, rows, 2 K)."""
     loss_rows, voltage = losses(motion.piece), motion.voltage.copy()

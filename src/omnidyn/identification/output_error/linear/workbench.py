@@ -10,9 +10,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
-from omnidyn.identification.output_error.engines.engine import Engine
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.engines.kinds import Kind, kind_with
+from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
@@ -31,10 +30,10 @@ class Workbench:
 
     problem: Problem
     point: Point
-    kind: type[Engine[Problem]]
-    motions: Sequence[Motion]
+    kind: Kind
+    motions: Sequence[DrivenMotion]
     moments: Sequence[float] = ()
-    _before: dict[type[Engine[Problem]], list[FloatArray]] = field(default_factory=dict)
+    _before: dict[Kind, list[FloatArray]] = field(default_factory=dict)
 
     @property
     def robot(self) -> Robot:
@@ -48,28 +47,27 @@ class Workbench:
         what that is off by goes out of the difference. Raises OmnidynError for what cannot be simulated.
         """
         other_robot = robot or self.robot
-        kind = self.kind if not self.kind.exact or is_exact(other_robot) else ImplicitEngine
+        kind = self.kind if not self.kind.exact or is_exact(other_robot) else kind_with()
         if kind not in self._before:
             self._before[kind] = self._residuals(self.robot, IDEAL, kind)
         return _apart(self._before[kind], self._residuals(other_robot, driver, kind))
 
     def changes(self, base_robot: Robot, other_robots: Sequence[Robot]) -> list[list[FloatArray]]:
         """What the columns show of other robots less what they show of one that the same engine simulates."""
-        base_residuals = self._residuals(base_robot, IDEAL, ImplicitEngine)
-        return [
-            _apart(base_residuals, self._residuals(other_robot, IDEAL, ImplicitEngine)) for other_robot in other_robots
-        ]
+        kind = kind_with()
+        base_residuals = self._residuals(base_robot, IDEAL, kind)
+        return [_apart(base_residuals, self._residuals(other_robot, IDEAL, kind)) for other_robot in other_robots]
 
     def on_time(self) -> Workbench:
         """The same with channels that are not late."""
         values = on_time(self.problem.parameters, self.point.values)
         return replace(self, point=replace(self.point, values=values), _before={})
 
-    def by_force(self, force: Callable[[Motion], FloatArray]) -> list[FloatArray]:
+    def by_force(self, force: Callable[[DrivenMotion], FloatArray]) -> list[FloatArray]:
         """What forces (n, K, 3) on the body show. Of each piece (C, rows, K)."""
         return self.by_forces([force])[0]
 
-    def by_forces(self, forces: Sequence[Callable[[Motion], FloatArray]]) -> list[list[FloatArray]]:
+    def by_forces(self, forces: Sequence[Callable[[DrivenMotion], FloatArray]]) -> list[list[FloatArray]]:
         """What each of several forces shows: in one go through the rows, which takes hardly longer than one of them."""
         columns_by_force: list[list[FloatArray]] = [[] for _ in forces]
         for motion in self.motions:
@@ -80,7 +78,7 @@ class Workbench:
                 columns.append(part)
         return columns_by_force
 
-    def _residuals(self, robot: Robot, driver: Driver, kind: type[Engine[Problem]]) -> list[FloatArray]:
+    def _residuals(self, robot: Robot, driver: Driver, kind: Kind) -> list[FloatArray]:
         robot_count, records = self.problem.robot_count, dict[int, Record]()
         pieces = [replace(piece, record=_driven(piece, driver, records)) for piece in self.problem.pieces]
         bare_problem = Problem(robot, self.problem.parameters[robot_count:], 0, tuple(pieces))

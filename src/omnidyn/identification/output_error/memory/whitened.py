@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.identification.output_error.engines.engine import Engine
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
+from omnidyn.identification.output_error.engines.engine import FitEngine
+from omnidyn.identification.output_error.engines.kinds import kind_with
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.outputs import SPEEDS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
@@ -22,7 +22,7 @@ FORGETTING_ROWS = 1000  # rows missing in a row after which a stretch begins ane
 Rows = tuple[NDArray[np.intp], IntArray]  # which rows of a piece are known, rows since the one before (0: at a start)
 
 
-class WhitenedEngine(Engine[Problem]):
+class WhitenedEngine(FitEngine[Problem]):
     """engine: which simulates. models: the memory of each column; one that is not named has none. moves: of each piece
     (C, rows), see `moving_rows`; by default as at the first point that is asked for, and from there on the same.
 
@@ -32,7 +32,7 @@ class WhitenedEngine(Engine[Problem]):
 
     def __init__(
         self,
-        engine: Engine[Problem],
+        engine: FitEngine[Problem],
         models: Mapping[Column, AutoRegression],
         moves: Sequence[BoolArray] | None = None,
     ):
@@ -40,7 +40,7 @@ class WhitenedEngine(Engine[Problem]):
         self.tol = engine.tol
 
     @property
-    def unfiltered(self) -> Engine[Problem]:
+    def unfiltered(self) -> FitEngine[Problem]:
         """The engine that simulates, whose rows are as they are."""
         return self.engine
 
@@ -79,13 +79,13 @@ class WhitenedEngine(Engine[Problem]):
         return residual, slopes, indices
 
 
-class TangentEngine(Engine[Problem]):
+class TangentEngine(FitEngine[Problem]):
     """Shows what another engine would show near a point if its rows were straight there: nothing is simulated.
 
     moves: of each piece, the rows that move at that point.
     """
 
-    def __init__(self, engine: Engine[Problem], point: Point):
+    def __init__(self, engine: FitEngine[Problem], point: Point):
         self.problem, self.point, self._parts = engine.problem, point, engine.residuals(point)
         self.moves = [moving_rows(piece, part[0]) for piece, part in zip(self.problem.pieces, self._parts, strict=True)]
 
@@ -101,7 +101,7 @@ class TangentEngine(Engine[Problem]):
         return parts_by_piece
 
 
-class NearEngine(Engine[Problem]):
+class NearEngine(FitEngine[Problem]):
     """Shows what `exact_engine` would show near a point, by `fast_engine`, an engine of the same problem, corrected at
     the point.
 
@@ -110,7 +110,7 @@ class NearEngine(Engine[Problem]):
     where those of the dear engine are, which must have the last word.
     """
 
-    def __init__(self, exact_engine: Engine[Problem], fast_engine: Engine[Problem], point: Point):
+    def __init__(self, exact_engine: FitEngine[Problem], fast_engine: FitEngine[Problem], point: Point):
         self.problem, self._cheap = exact_engine.problem, fast_engine
         pairs = zip(exact_engine.residuals(point), fast_engine.residuals(point), strict=True)
         self._off = [(np.nan_to_num(a[0] - b[0]), np.nan_to_num(a[1] - b[1])) for a, b in pairs]
@@ -128,11 +128,24 @@ class NearEngine(Engine[Problem]):
         ]
 
 
-def near(engine: Engine[Problem], point: Point) -> Engine[Problem]:
+def whitened_engine(
+    engine: FitEngine[Problem], models: Mapping[Column, AutoRegression], moves: Sequence[BoolArray] | None = None
+) -> FitEngine[Problem]:
+    """The engine with its rows filtered by the memory of each column, see `WhitenedEngine`."""
+    return WhitenedEngine(engine, models, moves)
+
+
+def tangent_at(engine: FitEngine[Problem], point: Point) -> tuple[FitEngine[Problem], Sequence[BoolArray]]:
+    """(an engine whose rows are straight near a point, which simulates no more; of each piece the rows that move)."""
+    tangent = TangentEngine(engine, point)
+    return tangent, tangent.moves
+
+
+def near(engine: FitEngine[Problem], point: Point) -> FitEngine[Problem]:
     """An engine for a few steps from a point: by a step a row where one with a tolerance simulates, else itself."""
     if engine.tol is None:
         return engine
-    return NearEngine(engine, ImplicitEngine.of(engine.problem), point)
+    return NearEngine(engine, kind_with().of(engine.problem), point)
 
 
 def moving_rows(piece: Piece, residual: FloatArray) -> BoolArray:

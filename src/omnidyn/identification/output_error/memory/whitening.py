@@ -32,16 +32,16 @@ from scipy.special import chdtri
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.parallel import side_by_side
-from omnidyn.identification.output_error.engines.engine import Engine
+from omnidyn.identification.output_error.engines.engine import FitEngine
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
 from omnidyn.identification.output_error.memory.innovations import without_gaps
 from omnidyn.identification.output_error.memory.whitened import (
-    TangentEngine,
-    WhitenedEngine,
     known_rows,
     moving_rows,
     near,
     spacing,
+    tangent_at,
+    whitened_engine,
 )
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.identification.output_error.solve.normal_equations import of_states
@@ -70,7 +70,7 @@ FEW_MEMORIES = 10.0  # memories in a log, below which the memory itself is hardl
 @dataclass(frozen=True, eq=False)
 class Weighed:
     """A point and how far it can be trusted. solution: by filtered rows where errors remember, its solver has a
-    WhitenedEngine then. plain_solution: the same point with residuals as they are. uncertainty: the trust in
+    filtered then. plain_solution: the same point with residuals as they are. uncertainty: the trust in
     `solution`. models: the memory of each column, none where rows are not filtered. warnings: what a reader must know
     of that."""
 
@@ -149,12 +149,10 @@ def _straight(
     solver: Solver[Problem], start: Point, models: Mapping[Column, AutoRegression]
 ) -> Mapping[Column, AutoRegression]:
     """The memory that rows straight near a point settle at, memory and numbers in turn: nothing is simulated for it."""
-    tangent, point = TangentEngine(solver.engine.unfiltered, start), start
+    (tangent, moves), point = tangent_at(solver.engine.unfiltered, start), start
     for _ in range(TURNS):
-        new_solution = _filtered(solver, tangent, models, solver.close, tangent.moves).minimise(point, FEW_STEPS)
-        models = _memory(
-            new_solution, _inverse(Normal(new_solution.solver, new_solution.state).information), tangent.moves
-        )
+        new_solution = _filtered(solver, tangent, models, solver.close, moves).minimise(point, FEW_STEPS)
+        models = _memory(new_solution, _inverse(Normal(new_solution.solver, new_solution.state).information), moves)
         movement, point = _moved(new_solution, point), new_solution.state.point
         if movement <= SETTLED_ERRORS:
             break
@@ -163,13 +161,13 @@ def _straight(
 
 def _filtered(
     solver: Solver[Problem],
-    engine: Engine[Problem],
+    engine: FitEngine[Problem],
     models: Mapping[Column, AutoRegression],
     precision: float,
     moves: Sequence[BoolArray] | None = None,
 ) -> Solver[Problem]:
     """The solver for errors of these memories, which ends `precision` to the best point."""
-    return Solver(solver.problem, WhitenedEngine(engine, models, moves), 0.0, precision, solver.counted)
+    return Solver(solver.problem, whitened_engine(engine, models, moves), 0.0, precision, solver.counted)
 
 
 def _moved(new_solution: Solution, point_before: Point) -> float:
@@ -265,7 +263,7 @@ def _trusted(new_solution: Solution, uncertainty_before: Trust, models: Mapping[
     solver = new_solution.solver
     uncertainty = trust(solver, new_solution, WHITE)
     degrees = _degrees(new_solution, uncertainty, models)
-    filtered_parts = WhitenedEngine(solver.engine.unfiltered, models).residuals(new_solution.state.point)
+    filtered_parts = whitened_engine(solver.engine.unfiltered, models).residuals(new_solution.state.point)
     widening_factors = widening(
         solver.problem,
         filtered_parts,

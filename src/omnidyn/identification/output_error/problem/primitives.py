@@ -1,6 +1,6 @@
 """From the robot to the numbers of the exact step and of the outputs, and how these change with a free parameter.
 
-The physics stands in model/ and exact/march.py; here it is only read off, once for the value and once or twice
+The physics stands in model/ and exact/exact_march.py; here it is only read off, once for the value and once or twice
 for each derivative. The friction of the axes enters linearly, each axis for itself: there one probe serves all six
 numbers, and the whole fit.
 """
@@ -21,7 +21,7 @@ from omnidyn.model.keys import BOX, Key
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
-from omnidyn.simulation.exact.march import axis_levels
+from omnidyn.simulation.exact.exact_march import axis_levels
 
 EPS = 1e-5  # relative change of a parameter: rounding 1e-11, curvature 1e-10
 

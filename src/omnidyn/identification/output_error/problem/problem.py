@@ -55,7 +55,7 @@ class Piece:
         return start_information * (self.start - state[: len(self.start)]), start_information
 
 
-class Fitted:
+class FitProblem:
     """What the solver needs of a problem, whatever it is that moves: parameters, and the pieces that are fitted to.
 
     What all pieces have in common is found once: each piece asks for it at each point of a fit.
@@ -97,7 +97,7 @@ class Fitted:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem(Fitted):
+class Problem(FitProblem):
     """robot: where the fit starts. parameters: of the robot file first, then nuisances. pieces: what is fitted to."""
 
     robot: Robot

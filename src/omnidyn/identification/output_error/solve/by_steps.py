@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from omnidyn.identification.output_error.engines.engine import Engine
+from omnidyn.identification.output_error.engines.engine import FitEngine
 from omnidyn.identification.output_error.engines.implicit import SPEED_TOLERANCE
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.first_point import coarse_point, point_of
@@ -15,7 +15,7 @@ FIT_PRECISION = 1e-4  # squared distance to the best point, in standard errors, 
 
 def solve_by_steps(
     problem: Problem,
-    kind: type[Engine[Problem]],
+    kind: type[FitEngine[Problem]],
     nu: float,
     progress: FitProgress,
     base_solution: Solution | None = None,

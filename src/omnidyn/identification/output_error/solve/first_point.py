@@ -9,8 +9,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import side_by_side
-from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
+from omnidyn.identification.output_error.engines.engine import FitEngine
+from omnidyn.identification.output_error.engines.kinds import kind_with, rolling_engine
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TRAVELS
 from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.problem.primitives import PrimitiveMap
@@ -20,8 +20,6 @@ from omnidyn.identification.output_error.problem.starts import friction_values, 
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import NEAR_PRECISION, Solution, Solver, State
 from omnidyn.model.keys import FRICTION, find_key
-from omnidyn.model.robot import Robot
-from omnidyn.simulation.sensitivity.late_sample import Direction
 
 CURRENTS, MOTOR = f"{LATENCY}.current", "motor"
 MANY_ROWS = 100_000  # rows to which a long log is first fitted
@@ -44,7 +42,7 @@ def first_point(solver: Solver, records: Sequence[Record]) -> State:
     values = start_point.values.copy()
     values[:count] = friction_values(mapping, start_point.values[:count], integral_point)
     short = problem.shortened(MANY_ROWS)
-    trial = solver if short is problem else Solver(short, ExactEngine(short))
+    trial = solver if short is problem else Solver(short, kind_with(exact=True).of(short))
     states = [trial.state(start_point), trial.state(Point(values, start_point.states))]
     best = _with_latencies(trial, min(states, key=lambda state: state.objective))
     return best if trial is solver else trial.minimise(best).state
@@ -103,7 +101,7 @@ def coarse_point(problem: Problem, nu: float, progress: FitProgress) -> State:
 
 def _by_row(problem: Problem, nu: float) -> Solver[Problem]:
     """The solver by a step a row: too coarse for counts, which are taken like any other output."""
-    return Solver(problem, ImplicitEngine.of(problem), nu, _precision(problem), counts_ticks=False)
+    return Solver(problem, kind_with().of(problem), nu, _precision(problem), counts_ticks=False)
 
 
 def _precision(problem: Problem) -> float:
@@ -127,31 +125,43 @@ def _on_time(problem: Problem) -> Problem:
     return replace(problem, parameters=tuple(parameters))
 
 
-class RateEngine(ImplicitEngine):
-    """The implicit engine, of headings, positions and angles of wheels their differences alone.
+class Rates(FitEngine[Problem]):
+    """An engine, of headings, positions and angles of wheels their differences alone.
 
     A path keeps what went wrong long ago: one turn too far spoils all that follows, and a later error that takes a part
     of it back is a minimum of its own, as far as anything from the best point. A difference forgets. It says less of
     the slow numbers, for the noise of neighbours is one and the same: it is where to start, not where to end.
     """
 
-    def _piece(
-        self,
-        robot: Robot,
-        moved: list[Direction],
-        scales: list[float],
-        piece: Piece,
-        state: FloatArray,
-        values: FloatArray,
-    ) -> Parts:
-        residual, slopes, indices = super()._piece(robot, moved, scales, piece, state, values)
-        for c, (name, _) in enumerate(piece.record.columns):
-            if name in TRAVELS:
-                known_rows = np.flatnonzero(np.isfinite(residual[c]))
-                residual_steps, slope_steps = np.diff(residual[c][known_rows]), np.diff(slopes[c][known_rows], axis=0)
-                residual[c] = np.nan
-                residual[c][known_rows[1:]], slopes[c][known_rows[1:]] = residual_steps, slope_steps
-        return residual, slopes, indices
+    def __init__(self, engine: FitEngine[Problem]):
+        self.problem, self._engine = engine.problem, engine
+
+    def on(self, problem: Problem) -> Rates:
+        """The same engine on other pieces of the same logs, with the same parameters."""
+        return Rates(self._engine.on(problem))
+
+    def bent(self, inner: FloatArray, step: FloatArray) -> FloatArray:
+        """A step of a fit as the engine that simulates bends it."""
+        return self._engine.bent(inner, step)
+
+    def residuals(self, point: Point) -> list[Parts]:
+        """Residuals and slopes of every piece, see engines/engine.py."""
+        return [
+            _differences(piece, parts)
+            for piece, parts in zip(self.problem.pieces, self._engine.residuals(point), strict=True)
+        ]
+
+
+def _differences(piece: Piece, parts: Parts) -> Parts:
+    """Parts of a piece, of what adds up the differences between rows."""
+    residual, slopes, indices = parts[0].copy(), parts[1].copy(), parts[2]
+    for c, (name, _) in enumerate(piece.record.columns):
+        if name in TRAVELS:
+            measured_rows = np.flatnonzero(np.isfinite(residual[c]))
+            residual_steps, slope_steps = (np.diff(values[c][measured_rows], axis=0) for values in (residual, slopes))
+            residual[c] = np.nan
+            residual[c][measured_rows[1:]], slopes[c][measured_rows[1:]] = residual_steps, slope_steps
+    return residual, slopes, indices
 
 
 def _by_rates(problem: Problem, point: Point, nu: float, progress: FitProgress) -> Point:
@@ -162,7 +172,7 @@ def _by_rates(problem: Problem, point: Point, nu: float, progress: FitProgress) 
     than their path, so that the better one of both is taken.
     """
     held_problem = _on_time(problem)
-    solver = Solver(held_problem, RateEngine(held_problem), nu, _precision(problem), counts_ticks=False)
+    solver = Solver(held_problem, Rates(rolling_engine(held_problem)), nu, _precision(problem), counts_ticks=False)
     rate_point = solver.minimise(point, progress=progress.aside("rates before paths")).state.point
     return Point(rate_point.values, point.states)
 

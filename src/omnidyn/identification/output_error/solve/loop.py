@@ -15,7 +15,8 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.methods import FREE, REST
-from omnidyn.identification.output_error.engines.speed_loop import SLOW_LOOP, LoopEngine
+from omnidyn.identification.output_error.engines.kinds import kind_with
+from omnidyn.identification.output_error.engines.speed_loop import SLOW_LOOP
 from omnidyn.identification.output_error.problem.nuisances import LEAST_LATENCY, MOST_LATENCY, TRAVELS
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
@@ -147,13 +148,14 @@ def _piece(record: Record, first: int, last: int) -> Piece:
 
 def solve_loop(problem: Problem, nu: float, progress: FitProgress) -> Solution:
     """Several starts with a step a tick, on what sets off; then all of it, as well as it must be."""
-    first = Solver(problem, LoopEngine(problem), nu)
+    kind = kind_with(has_loop=True)
+    first = Solver(problem, kind.of(problem), nu)
     coarse_solution = _motors_first(
         first, first.minimise(loop_start(problem, nu, progress), FEW_ITERATIONS, progress), progress
     )
     coarse_solution = first.minimise(retimed(first, coarse_solution.state.point, progress), progress=progress)
     progress.enter("the same as exactly as it must be")
-    fine_solver = Solver(problem, LoopEngine(problem, FINE_TOLERANCE), nu)
+    fine_solver = Solver(problem, kind.of(problem, FINE_TOLERANCE), nu)
     return beyond_jumps(fine_solver.minimise(coarse_solution.state.point, progress=progress), progress)
 
 
@@ -180,7 +182,7 @@ def _motors_first(solver: Solver, coarse_solution: Solution, progress: FitProgre
 def loop_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
     """Where a fit begins: the best of several starts, tried on what sets off."""
     short = shortened(problem, SETTING_OFF)
-    start_state = best_start(Solver(short, LoopEngine(short), nu), progress)
+    start_state = best_start(Solver(short, kind_with(has_loop=True).of(short), nu), progress)
     return Point(start_state.values, problem.start().states)
 
 

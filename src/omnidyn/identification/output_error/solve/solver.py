@@ -14,10 +14,10 @@ from typing import Any, Generic
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.output_error.engines.engine import Engine, P, Weighting
+from omnidyn.identification.output_error.engines.engine import FitEngine, P, Weighting
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
 from omnidyn.identification.output_error.problem.nuisances import TRAVELS
-from omnidyn.identification.output_error.problem.problem import Fitted, PieceSums, Point, per_column
+from omnidyn.identification.output_error.problem.problem import FitProblem, PieceSums, Point, per_column
 from omnidyn.identification.output_error.solve.normal_equations import (
     SPEED_LIMITS,
     damped,
@@ -58,7 +58,7 @@ class State:
     sums: list[PieceSums]
     objective: float
     variance: FloatArray
-    problem: Fitted | None = None
+    problem: FitProblem | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class Solver(Generic[P]):
     def __init__(
         self,
         problem: P,
-        engine: Engine[P],
+        engine: FitEngine[P],
         nu: float = 0.0,
         precision: float = END_PRECISION,
         counts_ticks: bool = True,
@@ -400,7 +400,7 @@ class Normal:
         return Point(self.solver.outer(inner_values), tuple(states))
 
 
-def _floor(problem: Fitted) -> FloatArray:
+def _floor(problem: FitProblem) -> FloatArray:
     """Least variance of each column: (PRECISION times its root mean square)^2."""
     columns = problem.columns
     size, count = np.zeros(len(columns)), np.zeros(len(columns))

@@ -11,7 +11,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX
 from omnidyn.identification.output_error.problem.friction_laws import LEVEL_RATIO, coulomb_below
 from omnidyn.identification.output_error.problem.parameters import AT
-from omnidyn.identification.output_error.problem.problem import Fitted
+from omnidyn.identification.output_error.problem.problem import FitProblem
 from omnidyn.model.keys import BREAKAWAY, find_key
 
 BOUND_TOLERANCE = 1e-12  # relative: nearer than this, S stands at its bound
@@ -20,7 +20,7 @@ BOUND_TOLERANCE = 1e-12  # relative: nearer than this, S stands at its bound
 class Order:
     """Pairs (S, C) of the parameters of a problem: S >= LEVEL_RATIO C."""
 
-    def __init__(self, problem: Fitted):
+    def __init__(self, problem: FitProblem):
         names = [p.name for p in problem.parameters]
         self.pairs: list[tuple[int, int]] = []
         for k, name in enumerate(names):
@@ -67,7 +67,7 @@ ENOUGH_ROWS = 500  # for their median
 class Edges:
     """Which parameters of a problem meet edges, and where."""
 
-    def __init__(self, problem: Fitted):
+    def __init__(self, problem: FitProblem):
         names = [p.name.partition("@")[0] for p in problem.parameters]
         jumps, latency_mask = (
             np.array([name.startswith(prefix) for name in names], bool) for prefix in (CURRENT, LATENCY_PREFIX)
@@ -93,7 +93,7 @@ class Edges:
         return step
 
 
-def _row(problem: Fitted) -> float:
+def _row(problem: FitProblem) -> float:
     """The usual time from row to row [s]; 0 where there is none."""
     piece = next(iter(problem.pieces), None)
     return piece.record.step_of(slice(piece.first, min(piece.last, piece.first + ENOUGH_ROWS) + 1)) if piece else 0.0

@@ -17,7 +17,7 @@ from omnidyn.errors import OmnidynError
 from omnidyn.identification.output_error.engines.engine import driver_of
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import Parameter
-from omnidyn.identification.output_error.problem.problem import Fitted, Problem
+from omnidyn.identification.output_error.problem.problem import FitProblem, Problem
 from omnidyn.model.actuation import DEAD_BAND, at_motors, without_map
 from omnidyn.model.dynamics import drive_wrench, settled_currents
 from omnidyn.model.frames import AXES
@@ -236,7 +236,7 @@ class Way:
     size: FloatArray
 
 
-def blind_ways(problem: Fitted, values: FloatArray, information: FloatArray) -> tuple[Way, ...]:
+def blind_ways(problem: FitProblem, values: FloatArray, information: FloatArray) -> tuple[Way, ...]:
     """The blind directions of a fit. values (P,); information (P, P): of the rows alone, states eliminated."""
     # What shows where sizes are the numbers themselves shows no less where they are larger; to find these takes time.
     if values.all() and not _lost(information, _own_sizes(problem, values))[1].any():
@@ -258,7 +258,7 @@ def _lost(information: FloatArray, size: FloatArray) -> tuple[FloatArray, BoolAr
     return scaled, eigen < max(LOST_DISTANCE**-2.0, EIGEN_TOLERANCE * float(eigen.max(initial=0.0))), vectors
 
 
-def sizes(problem: Fitted, values: FloatArray) -> FloatArray:
+def sizes(problem: FitProblem, values: FloatArray) -> FloatArray:
     """What a change of 1 is for each number, in the numbers that the solver sees. Shape (P,)."""
     # Of several groups there are as many robots: the one that their fit began from says how large things are.
     robot = problem.robot if isinstance(problem, Problem) else None
@@ -268,7 +268,7 @@ def sizes(problem: Fitted, values: FloatArray) -> FloatArray:
     return np.array([_size(p, v, push, top) for p, v in zip(problem.parameters, values.tolist(), strict=True)])
 
 
-def _own_sizes(problem: Fitted, values: FloatArray) -> FloatArray:
+def _own_sizes(problem: FitProblem, values: FloatArray) -> FloatArray:
     """The same by the numbers alone, whatever the motors can push. Shape (P,)."""
     push, top = np.zeros(3), np.ones(3)
     return np.array([_size(p, v, push, top) for p, v in zip(problem.parameters, values.tolist(), strict=True)])
@@ -292,7 +292,7 @@ def _size(p: Parameter, value: float, push: FloatArray, top: FloatArray) -> floa
     return max(SMALL * float(push.max()), 1e-9) if p.part in (TILT, PUSH) else 1.0
 
 
-def _pushes(problem: Fitted, robot: Robot) -> FloatArray:
+def _pushes(problem: FitProblem, robot: Robot) -> FloatArray:
     """The greatest wrench that the voltages of the logs give at rest [N, N, N m]. Shape (3,)."""
     push = np.zeros(3)
     for record in {id(piece.record): piece.record for piece in problem.pieces}.values():

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
+from omnidyn.identification.output_error.engines.kinds import rolling_engine
 from omnidyn.identification.output_error.problem.friction_laws import LEVEL_RATIO, speed_of
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
@@ -86,7 +86,7 @@ def _likely(solution: Solution, s: int, v: int, coulomb: float, limit: float) ->
         for k, value in ((s, level), (v, SUDDEN_SHARE * parameters[v].low)):
             values[k], parameters[k] = value, replace(parameters[k], value=value, low=value, high=value)
         held_problem = replace(problem, parameters=tuple(parameters))
-        solver = Solver(held_problem, ImplicitEngine(held_problem, TOL), solution.solver.nu, NEAR_PRECISION)
+        solver = Solver(held_problem, rolling_engine(held_problem, TOL), solution.solver.nu, NEAR_PRECISION)
         return solver.minimise(Point(values, point.states), REFIT).state.objective
 
     cost_by_level = {

@@ -10,7 +10,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.output_error.engines.engine import Engine, Weighting
+from omnidyn.identification.output_error.engines.engine import FitEngine, Weighting
 from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.problem.problem import PieceSums, Point, Problem
 from omnidyn.identification.output_error.solve.progress import FitProgress
@@ -273,10 +273,10 @@ def runs_by_group(solver: Solver, strata: Strata | None) -> dict[str, list[int]]
 # A problem in which one number is another one plus a given change: for the profile of a difference
 
 
-class TiedEngine(Engine[Problem]):
+class TiedEngine(FitEngine[Problem]):
     """An engine whose parameter `second` is `first` plus `change`, and so no longer free. Neither has a prior."""
 
-    def __init__(self, engine: Engine, first: int, second: int, change: float):
+    def __init__(self, engine: FitEngine, first: int, second: int, change: float):
         self._engine, self._first, self._second, self._change = engine, first, second, change
         full_problem, parameters = engine.problem, list(engine.problem.parameters)
         first_parameter, second_parameter = parameters[first], parameters[second]

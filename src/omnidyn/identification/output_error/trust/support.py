@@ -9,7 +9,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, earliest
 from omnidyn.identification.output_error.problem.parameters import EFFICIENCY, Parameter
-from omnidyn.identification.output_error.problem.problem import Fitted
+from omnidyn.identification.output_error.problem.problem import FitProblem
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver
 from omnidyn.model.actuation import DEAD_BAND, GAIN
 
@@ -49,7 +49,7 @@ def too_early(solver: Solver, solution: Solution) -> dict[str, float]:
 BOUND_SHARE = 0.01  # of the range: a descent that is on its way out is stopped by the last rows that it would lose
 
 
-def at_the_end(problem: Fitted, values: FloatArray) -> Iterator[Parameter]:
+def at_the_end(problem: FitProblem, values: FloatArray) -> Iterator[Parameter]:
     """Those near a bound that is no limit of nature; a friction, or a dead band, of 0 is at one, a gear without loss
     at another."""
     for p, value in zip(problem.parameters, values.tolist(), strict=True):

@@ -26,7 +26,7 @@ from scipy.special import chdtri
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.engine import Weighting
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, LEAST_SHARE, information, rounding
-from omnidyn.identification.output_error.kernel.march import FINAL, WAVES
+from omnidyn.identification.output_error.kernel.march_sums import FINAL, WAVES
 from omnidyn.identification.output_error.problem.problem import PieceSums, Problem, per_column
 from omnidyn.identification.output_error.solve.normal_equations import of_states
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State

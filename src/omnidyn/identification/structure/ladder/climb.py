@@ -23,12 +23,12 @@ from omnidyn.identification.ladder import STANDS, Ladder, Rung
 from omnidyn.identification.output_error.begin import ALL_LOGS
 from omnidyn.identification.output_error.conclusion import unexplained
 from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.linear.driven_motion import motions
 from omnidyn.identification.output_error.linear.free_run import margins_of
-from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.diagnosis import Examined, examine
-from omnidyn.identification.structure.ladder.held_out import GAIN_ERRORS, Errors, errors
+from omnidyn.identification.structure.ladder.held_out import Errors, errors
 from omnidyn.identification.structure.ladder.models import (
     Model,
     Move,
@@ -216,7 +216,7 @@ def judged(
         for model, errors_k in zip(models, errors_by_model, strict=True)
     ]
     paying = [k for k, reason in enumerate(reasons) if reason is None]
-    best = max(paying, key=lambda k: errors_by_model[k].gain(base_errors)[0], default=None)
+    best = max(paying, key=lambda k: errors_by_model[k].beside(base_errors).gain, default=None)
     similar_models = [
         k
         for k in paying
@@ -296,9 +296,9 @@ def _why_not(
     model: Model, model_errors: Errors, base_errors: Errors, count: int, untaken_gain: tuple[float, Statement | None]
 ) -> Statement | None:
     """Why a model is no step up, None where it is one."""
-    gain, std = model_errors.gain(base_errors)
-    if not gain > GAIN_ERRORS * std:
-        return Statement("predicts_no_better", NOTE)
+    comparison = model_errors.beside(base_errors)
+    if not comparison.is_better:
+        return Statement("predicts_no_better", NOTE, numbers=comparison.counts)
     if model_errors.bic(count) >= base_errors.bic():
         return Statement("costs_more_than_it_explains", NOTE)
     at_least, untaken_cause = untaken_gain
@@ -322,9 +322,10 @@ def _why_other(k: int, best_index: int | None, similar_models: Sequence[int], eq
 
 
 def _is_alike(best: Errors, best_errors: Errors) -> bool:
-    """Whether another model predicts as well as the best one, within a standard error, and is about as likely."""
-    gain, std = best.gain(best_errors)
-    return best is best_errors or (gain <= GAIN_ERRORS * std and best_errors.bic() - best.bic() < CLEAR_BIC_MARGIN)
+    """Whether held-out blocks do not tell another model from the best one, and it is about as likely."""
+    return best is best_errors or (
+        not best.beside(best_errors).is_better and best_errors.bic() - best.bic() < CLEAR_BIC_MARGIN
+    )
 
 
 def _is_same(left_errors: Errors, right_errors: Errors) -> bool:
@@ -362,7 +363,7 @@ def _rung(
     equal_keys: Sequence[str],
     base_model: Model,
 ) -> Rung:
-    gain, std = model_errors.gain(base_errors)
+    comparison = model_errors.beside(base_errors)
     rival_keys = dict.fromkeys(key for key in equal_keys if is_taken and key != model.key)
     shown_cause = as_fitted(model.cause, base_model.value, model.value)
     if model.replaced_step is not None:
@@ -373,8 +374,8 @@ def _rung(
         shown_cause,
         model_errors.numbers,
         model_errors.size,
-        gain,
-        std,
+        comparison.gain,
+        comparison.std,
         model_errors.bic(count) - base_errors.bic(),
         is_taken,
         reason,
@@ -440,8 +441,8 @@ def calmed(
     progress: FitProgress,
     gave_up: bool = False,
 ) -> tuple[Model, list[Rung]]:
-    """(the model to go on from, the rungs of a step): of Student's t where that predicts better, by more than a
-    standard error, what is not wild; as it stands, and no rungs, where no sample is wild, or a cause gains more.
+    """(the model to go on from, the rungs of a step): of Student's t where that predicts better what is not wild
+    in held-out blocks; as it stands, and no rungs, where no sample is wild, or a cause gains more.
     gave_up: no such cause paid. It counts as no number of the fit."""
     remedy_by_group = {
         group: remedy
@@ -460,8 +461,10 @@ def calmed(
         return base_model, []
     if not isinstance(calm_model, Model):
         return base_model, [*first, replace(rung, why=calm_model.reason)]
-    if not best.gain > best.gain_std:
-        return base_model, [*first, replace(rung, why=Statement("predicts_no_better", NOTE), value=calm_model.value)]
+    if best.comparison is None or not best.comparison.is_better:
+        counts = best.comparison.counts if best.comparison else {"better": 0, "blocks": 0}
+        reason = Statement("predicts_no_better", NOTE, numbers=counts)
+        return base_model, [*first, replace(rung, why=reason, value=calm_model.value)]
     taken_rung = replace(rung, why=Statement("pays", NOTE), value=calm_model.value, taken=True)
     return replace(calm_model, base_model=None), [*first, taken_rung]
 

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.linear.blocks import Blocks
-from omnidyn.identification.output_error.linear.rows import Linear, Rows
+from omnidyn.identification.output_error.linear.blocks import BlockProducts
+from omnidyn.identification.output_error.linear.rows import FitRows, Linear
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.decimated import Decimated
 from omnidyn.identification.output_error.problem.problem import Parts, Point, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 from omnidyn.identification.structure.tails import as_counted
 
 Shows = Callable[[Point], list[Parts]]
@@ -26,7 +27,6 @@ SIMULATION_RATIO = (
     1.5  # times what a fit to all leaves of a block, from which the error by a fit to all others is simulated
 )
 SHARES = (1.0, 0.5, 0.25, 0.125)  # of a step that are tried
-GAIN_ERRORS = 1.0  # standard errors of its gain by which a step must pay
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +51,9 @@ class Errors:
             n * np.log(max(self.square, 1e-300) / n) + self.numbers * np.log(n) + 2.0 * np.log(max(model_count, 1))
         )
 
-    def gain(self, base_errors: Errors) -> tuple[float, float]:
-        """(share of the squared held-out error of another model that this one takes away, its standard error)."""
-        change = (base_errors.held_out - self.held_out) / max(float(base_errors.held_out.sum()), 1e-300)
-        return float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change)))
+    def beside(self, base_errors: Errors) -> BlockComparison:
+        """How it predicts held-out blocks beside another model."""
+        return compare_blocks(base_errors.held_out, self.held_out)
 
 
 def errors(solution: Solution, memory: Memories, margins: Sequence[FloatArray], extra_numbers: int = 0) -> Errors:
@@ -69,7 +68,7 @@ def errors(solution: Solution, memory: Memories, margins: Sequence[FloatArray], 
         memory = next(iter(memory.values())) if isinstance(memory, Mapping) else memory
         blocks, row_count = _blocks(solution, memory, margins)
     else:
-        parts, row_count, counted_priors = list[tuple[Blocks, IntArray]](), 0, set[int]()
+        parts, row_count, counted_priors = list[tuple[BlockProducts, IntArray]](), 0, set[int]()
         for member in engine.members:
             group_margins = [margins[k] for k in member.places]
             group_blocks, rows = _blocks(
@@ -92,7 +91,7 @@ def _blocks(
     memory: Sequence[AutoRegression],
     margins: Sequence[FloatArray],
     counted_priors: Container[int] = (),
-) -> tuple[Blocks, int]:
+) -> tuple[BlockProducts, int]:
     """(blocks of one group, how many rows they have). counted_priors: parameters whose priors another group has
     already."""
     full_problem, point = solution.solver.problem, solution.state.point
@@ -102,7 +101,7 @@ def _blocks(
     engine = solution.solver.engine.on(decimated.all_rows(problem))
     shows: Shows = lambda columns: as_counted(solution, problem, decimated.kept(engine.residuals(columns)))  # noqa: E731
     parameters = [replace(p, prior=None) if k in counted_priors else p for k, p in enumerate(problem.parameters)]
-    rows = Rows.of(replace(problem, parameters=tuple(parameters)), point, shows(point))
+    rows = FitRows.of(replace(problem, parameters=tuple(parameters)), point, shows(point))
     slopes = [
         np.where(solution.held_parameters, 0.0, slope) for slope in rows.slopes
     ]  # what a bound holds, holds in every block
@@ -111,7 +110,7 @@ def _blocks(
     return _AsTheyAre(linear, no_columns, shows), int(sum(mask.sum() for mask in rows.masks))
 
 
-class _AsTheyAre(Blocks):
+class _AsTheyAre(BlockProducts):
     """The blocks of a fit, and what its engine shows at a point: what one to all others predicts can be simulated."""
 
     def __init__(self, linear: Linear, columns_by_piece: Sequence[FloatArray], shows: Shows):
@@ -150,16 +149,16 @@ class _AsTheyAre(Blocks):
             for p, value, shift in zip(rows.problem.parameters, rows.point.values.tolist(), step.tolist(), strict=True)
         ]
         point = replace(rows.point, values=np.array(values))
-        simulated_rows = Rows.of(rows.problem, point, self.shows(point))
+        simulated_rows = FitRows.of(rows.problem, point, self.shows(point))
         moved_rows = replace(rows, point=point, residual=simulated_rows.residual)
         return replace(self.linear, rows=moved_rows).whole()[0] ** 2
 
 
-class _Together(Blocks):
+class _Together(BlockProducts):
     """The blocks of several groups as those of one fit: their scalar products add up, each where its parameters stand
     among all. parts: blocks of a group, and where its parameters stand (P of the group,)."""
 
-    def __init__(self, parts: Sequence[tuple[Blocks, IntArray]], count: int):
+    def __init__(self, parts: Sequence[tuple[BlockProducts, IntArray]], count: int):
         self.count, self.rows = count, sum(part.rows for part, _ in parts)
         self.matrix = np.zeros((len(parts[0][0].matrix), 1 + count, 1 + count))
         self.total = np.zeros((1 + count, 1 + count))

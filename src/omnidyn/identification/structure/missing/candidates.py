@@ -16,7 +16,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import CHANGE
-from omnidyn.identification.output_error.linear.motion import Motion, in_the_room
+from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion, in_the_room
 from omnidyn.identification.output_error.linear.workbench import Workbench, scaled
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN, Driver
@@ -32,7 +32,7 @@ CHANGE_SHARES = np.linspace(0.1, 0.9, 9)  # shares of the run at which it may ch
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedCandidate:
     """A candidate that was fitted: what it is, how many numbers it took, number -> (before, with it)."""
 
     cause: Statement
@@ -47,7 +47,7 @@ class Trial:
 
     columns_by_piece: list[FloatArray]
     at: float = 0.0
-    fitted: Fitted | None = None
+    fitted: FittedCandidate | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,11 +149,11 @@ def _driver(name: str, driver: Driver, size: float) -> Callable[[Workbench], lis
     return lambda bench: [Trial([columns / size for columns in bench.change(driver=driver)])]
 
 
-def _by(force: Callable[[Motion], FloatArray]) -> Callable[[Workbench], list[Trial]]:
+def _by(force: Callable[[DrivenMotion], FloatArray]) -> Callable[[Workbench], list[Trial]]:
     return lambda bench: [Trial(bench.by_force(force))]
 
 
-def _on_the_body(motion: Motion) -> FloatArray:
+def _on_the_body(motion: DrivenMotion) -> FloatArray:
     """A constant push along each axis. Shape (n, 3, 3)."""
     return np.tile(np.eye(N_AXES), (len(motion.t), 1, 1))
 
@@ -172,7 +172,7 @@ def _late(channel: str) -> Callable[[Workbench], list[Trial]]:
     return trials
 
 
-def _later(force: Callable[[Motion], FloatArray]) -> Callable[[Workbench], list[Trial]]:
+def _later(force: Callable[[DrivenMotion], FloatArray]) -> Callable[[Workbench], list[Trial]]:
     """Forces that begin at some time of the log, at several times."""
 
     def trials(bench: Workbench) -> list[Trial]:
@@ -191,17 +191,17 @@ def _seconds(bench: Workbench, share: float) -> float | None:
     return share * max(spans) if max(spans) < 1.02 * min(spans) else None
 
 
-def _friction(motion: Motion) -> FloatArray:
+def _friction(motion: DrivenMotion) -> FloatArray:
     speed = motion.twist[:, None, :]
     return -np.concatenate([np.eye(N_AXES) * np.sign(speed), np.eye(N_AXES) * speed], axis=1)
 
 
-def _inertia(motion: Motion) -> FloatArray:
+def _inertia(motion: DrivenMotion) -> FloatArray:
     """Of a mass that is added to the body, and of its inertia."""
     return -np.stack([motion.pace * [1.0, 1.0, 0.0], motion.pace * [0.0, 0.0, 1.0]], axis=1)
 
 
-def _drive(motion: Motion) -> FloatArray:
+def _drive(motion: DrivenMotion) -> FloatArray:
     """Of voltages that are all larger by a share: what the motors push with, without the back-EMF."""
     stall_wrench = drive_wrench(motion.robot, np.zeros_like(motion.twist), motion.voltage)
     return stall_wrench[:, None, :]
@@ -211,7 +211,7 @@ def _drive(motion: Motion) -> FloatArray:
 #
 # Where one of these explains more than all that is offered, the answer says what it looks like, and offers no remedy.
 
-Force = Callable[[Motion, float], FloatArray]
+Force = Callable[[DrivenMotion, float], FloatArray]
 WAVES = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 9.0, 12.0, 24.0)  # a turn of a wheel
 
 
@@ -241,27 +241,27 @@ def _along_axes(values: FloatArray) -> FloatArray:
     return np.eye(N_AXES) * values[:, None, :]
 
 
-def _one_way(motion: Motion, _: float) -> FloatArray:
+def _one_way(motion: DrivenMotion, _: float) -> FloatArray:
     return _along_axes((motion.twist != 0.0).astype(float))
 
 
-def _drag(motion: Motion, _: float) -> FloatArray:
+def _drag(motion: DrivenMotion, _: float) -> FloatArray:
     return _along_axes(-motion.twist * np.abs(motion.twist))
 
 
-def _waves(motion: Motion, count: float) -> FloatArray:
+def _waves(motion: DrivenMotion, count: float) -> FloatArray:
     g, turned_angles = motion.robot.wheels.wrench_matrix, motion.turned
     moving = (motion.twist @ g != 0.0).astype(float)
     waves = np.concatenate([np.cos(count * turned_angles) * moving, np.sin(count * turned_angles) * moving], axis=1)
     return waves[:, :, None] * np.concatenate([g, g], axis=1).T
 
 
-def _sag(motion: Motion, _: float) -> FloatArray:
+def _sag(motion: DrivenMotion, _: float) -> FloatArray:
     draw = np.abs(motion.current).sum(axis=1, keepdims=True)
     return -((motion.voltage * draw) @ motion.robot.wheels.wrench_matrix.T)[:, None, :]
 
 
-def _heat(motion: Motion, _: float) -> FloatArray:
+def _heat(motion: DrivenMotion, _: float) -> FloatArray:
     step = np.append(np.diff(motion.t), 0.0)[:, None]
     heat = np.cumsum(motion.current**2 * step, axis=0)
     return -((motion.current * heat) @ motion.robot.wheels.wrench_matrix.T)[:, None, :]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.structure.missing.candidates import (
     CHANGE,
@@ -73,7 +73,7 @@ def _of_the_body(bench: Workbench) -> Iterator[Candidate]:
     yield Candidate(CENTRE, lambda b: [Trial(b.by_force(_off_centre))], centre)
 
 
-def _off_centre(motion: Motion) -> FloatArray:
+def _off_centre(motion: DrivenMotion) -> FloatArray:
     """What a centre of mass a metre ahead, and one a metre aside, does to the body as it moves. Shape (n, 2, 3)."""
     body, wrenches = motion.robot.body, []
     for way in np.eye(2) * CENTRE_STEP:
@@ -218,7 +218,7 @@ def _with_table(friction: Friction, table: str, law: Any) -> Friction:
     return friction.model_copy(update={table.rpartition(".")[2]: law})
 
 
-def _falling(force: Callable[[Motion, float], FloatArray], bench: Workbench) -> list[Trial]:
+def _falling(force: Callable[[DrivenMotion, float], FloatArray], bench: Workbench) -> list[Trial]:
     """A level that is larger at rest by a share of Coulomb friction, a number for each part of `force`: to first order,
     where the robot moves. Tried with several speeds over which it falls [m/s at the rims]."""
     top = max(float(np.abs(m.twist @ bench.robot.wheels.wrench_matrix).max()) for m in bench.motions)
@@ -260,12 +260,12 @@ def arm(robot: Robot) -> float:
     return float(np.mean(robot.wheels.robot_radius))
 
 
-def _of_axes(motion: Motion, fall_speed: float) -> FloatArray:
+def _of_axes(motion: DrivenMotion, fall_speed: float) -> FloatArray:
     speed, level = motion.twist * [1.0, 1.0, arm(motion.robot)], motion.robot.friction.axes.coulomb
     return np.eye(N_AXES) * (-np.sign(speed) * fallen(speed, 1.0 / fall_speed, EXPONENT) * level)[:, None, :]
 
 
-def _of_travel(motion: Motion, fall_speed: float) -> FloatArray:
+def _of_travel(motion: DrivenMotion, fall_speed: float) -> FloatArray:
     """Along the direction of travel, and about yaw."""
     law, yaw = motion.robot.friction.direction, motion.twist[:, YAW]
     scaled_twist = motion.twist[:, :YAW] * law.coulomb
@@ -278,7 +278,7 @@ def _of_travel(motion: Motion, fall_speed: float) -> FloatArray:
     return -np.stack([np.column_stack([travel_force, zero]), np.column_stack([zero, zero, yaw_force])], axis=1)
 
 
-def _of_rims(motion: Motion, fall_speed: float) -> FloatArray:
+def _of_rims(motion: DrivenMotion, fall_speed: float) -> FloatArray:
     g, rim = motion.robot.wheels.wrench_matrix, motion.twist @ motion.robot.wheels.wrench_matrix
     level = per_wheel(motion.robot.friction.wheels.coulomb, g.shape[1])
     return -((np.sign(rim) * fallen(rim, 1.0 / fall_speed, EXPONENT) * level) @ g.T)[:, None, :]
@@ -381,7 +381,7 @@ def _breaking(table: str, bench: Workbench) -> list[Trial]:
     return trials
 
 
-def _at_rims(motion: Motion) -> FloatArray:
+def _at_rims(motion: DrivenMotion) -> FloatArray:
     """Coulomb and viscous friction of 1 at every rim. Shape (n, 2, 3)."""
     g = motion.robot.wheels.wrench_matrix
     rim = motion.twist @ g

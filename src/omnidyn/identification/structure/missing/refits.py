@@ -17,12 +17,10 @@ from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.engines.engine import Engine
-from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
+from omnidyn.identification.output_error.engines.engine import FitEngine
+from omnidyn.identification.output_error.engines.kinds import Kind, kind_with
 from omnidyn.identification.output_error.linear.workbench import on_time
 from omnidyn.identification.output_error.prepare import (
-    Kind,
     expand_keys,
     make_problem,
     stays_exact,
@@ -30,7 +28,7 @@ from omnidyn.identification.output_error.prepare import (
 from omnidyn.identification.output_error.problem.nuisances import PUSH
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
-from omnidyn.identification.structure.missing.candidates import CHANGE, Candidate, Fitted, Trial
+from omnidyn.identification.structure.missing.candidates import CHANGE, Candidate, FittedCandidate, Trial
 from omnidyn.identification.structure.missing.switches import Switch, as_fitted, simpler_first, switches
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 
@@ -77,10 +75,7 @@ def refits(
         solution.solver.engine,
         problem.pieces[0].record is not solution.solver.problem.pieces[0].record,
     )
-    kinds = [
-        type(engine) if engine.has_loop else ImplicitEngine,
-        *([ExactEngine] if is_decimated and engine.exact else []),
-    ]
+    kinds = [kind_with(has_loop=engine.has_loop), *([kind_with(exact=True)] if is_decimated and engine.exact else [])]
     try:
         errors_by_kind = {kind: _by_coarse_steps(problem, parts, point, kind) for kind in kinds}
     except OmnidynError:  # a nuisance that the implicit engine does not know
@@ -115,7 +110,7 @@ def _question(problem: Problem) -> OutputError:
     return OutputError(free=problem.names[: problem.robot_count], nuisances=problem.names[problem.robot_count :])
 
 
-class _Coarse(Engine[Problem]):
+class _Coarse(FitEngine[Problem]):
     """An engine by a step a row, or a tick, three times as fast, and what that was off by in the fit before."""
 
     def __init__(self, problem: Problem, kind: Kind, coarse_errors: Sequence[FloatArray]):
@@ -165,7 +160,8 @@ def _begun(
         problem.pieces[0].record is not solution.solver.problem.pieces[0].record,
     )
     exact = not coarse_kind.has_loop and is_exact(way.robot) and stays_exact(way.robot, keys)
-    kind = ExactEngine if exact and (not is_decimated or ExactEngine in errors_by_kind) else coarse_kind
+    exact_kind = kind_with(exact=True)
+    kind = exact_kind if exact and (not is_decimated or exact_kind in errors_by_kind) else coarse_kind
     new_problem = make_problem(records, way.robot, replace(way.question, free=keys), kind)
     prior_by_name = {p.name: p.prior for p in problem.parameters}  # of the robot file, not of where the fit ended
     parameters = tuple(replace(p, prior=prior_by_name.get(p.name, p.prior)) for p in new_problem.parameters)
@@ -192,7 +188,9 @@ def _trial(refit: _Refit, problem: Problem, parts: Sequence[Parts], solution: So
         name: (values_before[name], value[name]) for name in problem.names[: problem.robot_count] if name in value
     }
     numbers = max(len(new_problem.parameters) - len(problem.parameters) + refit.way.numbers, 1)
-    return Trial(columns_by_piece, fitted=Fitted(as_fitted(refit.way.cause, values_before, value), numbers, changes))
+    return Trial(
+        columns_by_piece, fitted=FittedCandidate(as_fitted(refit.way.cause, values_before, value), numbers, changes)
+    )
 
 
 def _values(problem: Problem, solution: Solution) -> dict[str, float]:

@@ -14,14 +14,14 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Remedy
-from omnidyn.identification.output_error.linear.blocks import Blocks
-from omnidyn.identification.output_error.linear.rows import Linear, Rows
+from omnidyn.identification.output_error.linear.blocks import BlockProducts
+from omnidyn.identification.output_error.linear.rows import FitRows, Linear
+from omnidyn.identification.selection.blocks import compare_blocks
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial
 from omnidyn.model.actuation import GAIN
 from omnidyn.model.keys import BODY_AXES, DIRECTION
 from omnidyn.statement import NOTE, Statement
 
-LOSS_ERRORS = 2.0  # standard errors by which a remedy may seem worse on blocks it was not fitted to
 ZERO_SHARE = 1e-4  # of where a number began, below which there is none of it
 RIVAL = 0.3  # of what the best explains, from which another explanation is worth a look
 CHI2_MARGIN, CHI2_SHARE = 6.0, 0.05  # of chi squared, or its share, by which one must be better than the other
@@ -57,7 +57,7 @@ def remedies(
     flat = [(candidate, trial) for candidate, trials in candidate_trials for trial in trials]
     if not flat:
         return ()
-    blocks = Blocks(linear, *(trial.columns_by_piece for _, trial in flat), theme_columns)
+    blocks = BlockProducts(linear, *(trial.columns_by_piece for _, trial in flat), theme_columns)
     themes = np.arange(len(blocks.size) - theme_columns[0].shape[2], len(blocks.size))
     parameter_indices = np.arange(1, 1 + blocks.count)
     base, first, best = blocks.left(parameter_indices), 1 + blocks.count, {}
@@ -87,11 +87,10 @@ def remedies(
     worthy_results = [t for t in ranked_results if t.chi2 > penalty * t.numbers + 2.0 * np.log(max(len(best), 1))][
         : 2 * remedy_limit
     ]
-    ranking = []
+    ranking: list[tuple[Remedy, FloatArray]] = []
     for t in worthy_results:
         errors_after = blocks.held_out(np.concatenate([parameter_indices, t.column_indices]))
-        change = (errors_before - errors_after) / max(float(errors_before.sum()), 1e-300)
-        gain, std = float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change)))
+        comparison = compare_blocks(errors_before, errors_after)
         equal_keys = tuple(
             o.candidate.key
             for o in worthy_results
@@ -101,41 +100,42 @@ def remedies(
         cause = fitted.cause if fitted else t.candidate.cause(float(t.size[0]), t.trial.at)
         gain_with_themes = (base - blocks.left(np.concatenate([parameter_indices, t.column_indices, themes]))) / noise
         share = (t.chi2 - t.numbers) / max(gain_with_themes - t.numbers - len(themes), t.chi2 - t.numbers, 1e-300)
-        ranking.append(
-            Remedy(
-                t.candidate.key,
-                cause,
-                gain,
-                std,
-                equal_keys,
-                share,
-                t.candidate.is_offered,
-                t.chi2,
-                t.numbers,
-                tuple(t.size.tolist()),
-                t.trial.at,
-                fitted.changes if fitted else _changes(linear.rows, t),
-            )
+        remedy = Remedy(
+            t.candidate.key,
+            cause,
+            comparison.gain,
+            comparison.std,
+            equal_keys,
+            share,
+            t.candidate.is_offered,
+            t.chi2,
+            t.numbers,
+            tuple(t.size.tolist()),
+            t.trial.at,
+            fitted.changes if fitted else _changes(linear.rows, t),
+            comparison=comparison,
         )
+        ranking.append((remedy, errors_after))
     kept_remedies = [
-        r for r in ranking if r.gain > -LOSS_ERRORS * r.gain_std and r.chi2 > RIVAL * worthy_results[0].chi2
+        (remedy, errors_after)
+        for remedy, errors_after in ranking
+        if remedy.chi2 > RIVAL * worthy_results[0].chi2 and not compare_blocks(errors_after, errors_before).is_better
     ]
     return tuple(_best_first(kept_remedies)[:remedy_limit])
 
 
-def _best_first(ranking: list[Remedy]) -> list[Remedy]:
-    """By what they explain; before all of them what on held-out blocks is clearly better than the first.
+def _best_first(ranking: Sequence[tuple[Remedy, FloatArray]]) -> list[Remedy]:
+    """By what they explain; before all of them what predicts held-out blocks better than the first.
 
-    What rows do near the fit tells less of a large change than whether it holds on the next block.
+    What rows do near the fit tells less of a large change than whether it holds on the next block. ranking: remedies,
+    and the squared errors of held-out blocks with each.
     """
-    if not ranking:
-        return ranking
-    first = ranking[0]
-    better_remedies = [r for r in ranking if r.gain - r.gain_std > first.gain + first.gain_std]
-    return [*sorted(better_remedies, key=lambda r: -r.gain), *(r for r in ranking if r not in better_remedies)]
+    better_remedies = [r for r, errors in ranking if compare_blocks(ranking[0][1], errors).is_better]
+    others = (r for r, _ in ranking if r not in better_remedies)
+    return [*sorted(better_remedies, key=lambda r: -r.gain), *others]
 
 
-def _changes(rows: Rows, result: Tried) -> dict[str, tuple[float, float]]:
+def _changes(rows: FitRows, result: Tried) -> dict[str, tuple[float, float]]:
     """Number of the robot -> (what it is, what it would be beside a candidate), to first order; none for a candidate
     that takes the place of what these numbers belong to."""
     if result.candidate.key in (BODY_AXES, DIRECTION):
@@ -149,7 +149,12 @@ def _changes(rows: Rows, result: Tried) -> dict[str, tuple[float, float]]:
 
 
 def _same(
-    blocks: Blocks, parameter_indices: IntArray, base: float, noise: float, left_result: Tried, right_result: Tried
+    blocks: BlockProducts,
+    parameter_indices: IntArray,
+    base: float,
+    noise: float,
+    left_result: Tried,
+    right_result: Tried,
 ) -> bool:
     """Whether the log cannot tell two apart: as good as each other, and both hardly better than one."""
     joint_gain = (

@@ -14,7 +14,7 @@ from omnidyn.files import default_max_bytes, growth, open_regular, pieces, too_l
 from omnidyn.logs.readers.matlab.mat5 import MAX_EXPANSION, MIN_EXPANDED_BYTES, damaged, read_mat5
 from omnidyn.logs.readers.matlab.variables import Variables, tables_of
 from omnidyn.logs.readers.reader import Reader, ReadOptions
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY
 
 MAT5 = b"MATLAB 5.0 MAT-file"
@@ -38,7 +38,7 @@ def read_variables(path: str | os.PathLike, options: ReadOptions) -> Variables:
     return variables.chosen(options.variables)
 
 
-def _tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
+def _tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[FileTable]:
     yield from tables_of(read_variables(path, options), rows)
 
 

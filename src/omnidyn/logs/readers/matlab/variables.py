@@ -16,7 +16,7 @@ from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.readers.recording import Recording, Track, topic_of
 from omnidyn.logs.table.header import MAX_COLUMNS
 from omnidyn.logs.table.rows import refuse_infinite
-from omnidyn.logs.table.table import MAX_CELLS, Table
+from omnidyn.logs.table.table import MAX_CELLS, FileTable
 from omnidyn.units import TIME, known_unit
 
 WIDEST = 64  # a matrix with more columns is no table
@@ -116,7 +116,7 @@ def _is_time(name: str) -> bool:
     return last.lower() == "tout" or read_name(last).roles == {words.TIME}
 
 
-def tables_of(variables: Variables, rows: int) -> Iterator[Table]:
+def tables_of(variables: Variables, rows: int) -> Iterator[FileTable]:
     """The tables: one where all columns have one length, else those of a Recording, a track per time."""
     columns = {name: values for name, values in variables.columns.items() if len(values) > 1}
     if not columns:
@@ -136,8 +136,8 @@ def tables_of(variables: Variables, rows: int) -> Iterator[Table]:
         part = {name: values[first : first + block_rows].copy() for name, values in columns.items()}
         lines = np.arange(first + 1, min(first + block_rows, count) + 1)
         refuse_infinite(part, lines, variables.source)
-        yield Table(names, part, lines, {}, variables.source, "", variables.notes)
-    yield Table(names, {}, np.zeros(0, dtype=np.int64), {}, variables.source, variables.sha256, variables.notes)
+        yield FileTable(names, part, lines, {}, variables.source, "", variables.notes)
+    yield FileTable(names, {}, np.zeros(0, dtype=np.int64), {}, variables.source, variables.sha256, variables.notes)
 
 
 def recording_of(variables: Variables) -> Recording:

@@ -20,7 +20,7 @@ from omnidyn.logs.readers.ros.db3_file import Db3File
 from omnidyn.logs.readers.ros.mcap_file import McapFile
 from omnidyn.logs.readers.ros.messages import Bag
 from omnidyn.logs.readers.ros.pack import MAX_EXPANSION, MIN_EXPANDED_BYTES, Unpacker, unpack_file
-from omnidyn.logs.table.table import Table
+from omnidyn.logs.table.table import FileTable
 from omnidyn.progress import Report
 
 SQLITE, ROSBAG, ZSTD = b"SQLite format 3\x00", b"#ROSBAG V", b"\x28\xb5\x2f\xfd"
@@ -87,10 +87,10 @@ def _opened(stream: BinaryIO, path: Path, limit: int, progress: Callable[[int], 
         yield (Bag1File if start.startswith(ROSBAG) else McapFile)(stream, size, unpacker, progress)
 
 
-def tables_of(read: Callable[[str | os.PathLike, ReadOptions], Recording]) -> Callable[..., Iterator[Table]]:
+def tables_of(read: Callable[[str | os.PathLike, ReadOptions], Recording]) -> Callable[..., Iterator[FileTable]]:
     """The `tables` of a Reader from what reads a Recording."""
 
-    def tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
+    def tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[FileTable]:
         yield from read(path, options).tables(rows)
 
     return tables

@@ -13,7 +13,7 @@ from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.layout import N_AXES, new_state
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.stick_slip.plant import plant
-from omnidyn.simulation.implicit.march import run_implicit
+from omnidyn.simulation.implicit.implicit_march import run_implicit
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.speed_loop import no_loop
 from tests.reference.make import FILE as TABLE_3_FILE

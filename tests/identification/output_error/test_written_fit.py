@@ -50,7 +50,9 @@ def test_what_was_asked_for_by_name_is_kept_and_doubted(late):
     given, log = late
     result = omnidyn.identify(log, given, OutputError(free="friction"), quick=True)
     assert set(result.value) == {key for key in result.value if key.startswith("friction.")}
-    assert "late_by_rows" in codes(result)
+    (late_by,) = (warning for warning in result.warnings if warning.code == "late_by_rows")
+    assert late_by.numbers["without"] > 1.5 * late_by.numbers["error"] > 0.0
+    assert "by the best fit without it" in str(late_by)
 
 
 def test_errors_that_remember_give_way_to_least_squares_that_predict_better(late):
@@ -68,7 +70,8 @@ def test_a_constant_push_is_fitted_where_it_is_there(tmp_path):
     for axis, truth in zip(("x", "y", "yaw"), PUSH, strict=True):
         found = result.nuisances[f"push.{axis}"]
         assert abs(found.value - truth) < max(4.0 * found.std, 0.02 * abs(truth))
-    assert "constant_force" in codes(result)
+    (force,) = (warning for warning in result.warnings if warning.code == "constant_force")
+    assert "10 of 10 blocks are predicted better" in str(force)
     assert result.held_out.written < 1.1 * share_of_noise(log)
     assert result.held_out.plain > 3.0 * result.held_out.written
 
@@ -130,10 +133,43 @@ def test_one_run_is_better_by_more_than_its_blocks_scatter():
     even = FreeRun(np.full((10, 2), 4.0), rows, spread)
     assert even.error == pytest.approx(np.sqrt(np.sqrt(0.4) * np.sqrt(0.4) / 2.0))
     better = FreeRun(np.full((10, 2), 3.0), rows, spread)
-    assert better.is_better(even)
-    assert not even.is_better(better)
+    assert better.improvement(even).better == 10
+    assert even.improvement(better) is None
     hardly = FreeRun(np.full((10, 2), 3.8), rows, spread)
-    assert not hardly.is_better(even)  # 5 % of the squares
+    assert hardly.improvement(even) is None  # 5 % of the squares
     before, after = np.full((10, 2), 4.0), np.full((10, 2), 4.6)
     before[3], after[3] = 40.0, 20.0
-    assert not FreeRun(after, rows, spread).is_better(FreeRun(before, rows, spread))  # in one block of ten
+    assert FreeRun(after, rows, spread).improvement(FreeRun(before, rows, spread)) is None  # in one block of ten
+
+
+def test_a_robot_that_predicts_the_tail_better_is_said_to_be_kept(tmp_path):
+    """Few rows, and errors that last half the log: blocks between others look predicted by whatever follows them."""
+    log, given = plain_robot.log(3, levels=16, held=20, still=10), plain_robot.robot(tmp_path)
+    rng, half = np.random.default_rng(1003), len(log) // 2
+    fade, errors = np.exp(-2.0 / half), rng.standard_normal((len(log), 3))
+    for k in range(1, len(log)):
+        errors[k] = fade * errors[k - 1] + np.sqrt(1.0 - fade**2) * errors[k]
+    for axis, (viscous, coulomb) in enumerate(zip(plain_robot.VISCOUS, plain_robot.COULOMB, strict=True)):
+        given = Key.parse(f"friction.axes.viscous[{axis}]").set(given, viscous)
+        given = Key.parse(f"friction.axes.coulomb[{axis}]").set(given, coulomb)
+    slow = log.replace(wheel_speed=log.wheel_speed + 1.5 * errors)
+    first = slow.replace(t=slow.t[:half], voltage=slow.voltage[:half], wheel_speed=slow.wheel_speed[:half])
+    (kept,) = (
+        warning
+        for warning in omnidyn.identify(first, given, quick=True).warnings
+        if warning.code == "given_predicts_tail_better"
+    )
+    assert "keep the robot as given" in kept.with_remedy
+    assert kept.numbers["blocks"] == 4
+    right = plain_robot.log(3, levels=8)
+    assert "given_predicts_tail_better" not in codes(omnidyn.identify(right, plain_robot.robot(tmp_path), quick=True))
+
+
+def test_the_tail_is_compared_by_itself():
+    rows, spread = np.array([100.0]), np.array([1.0])
+    blocks, tail = np.full((10, 1), 4.0), np.full((4, 1), 4.0)
+    fitted, given = FreeRun(blocks, rows, spread, tail=tail), FreeRun(1.2 * blocks, rows, spread, tail=0.5 * tail)
+    assert given.improvement(fitted) is None
+    assert given.tail_improvement(fitted).gain == pytest.approx(0.5)
+    assert fitted.tail_improvement(given) is None
+    assert FreeRun(blocks, rows, spread).tail_improvement(fitted) is None

@@ -37,7 +37,7 @@ FLUSH = 128  # steps after which totals go into double precision
 TOTALS = 4  # sum, sum of squares, least and largest of each row
 
 
-class Record(NamedTuple):
+class KeptSamples(NamedTuple):
     """What a run keeps beside its end. history: (samples, 3 or 6, robots of all blocks), of every so many steps.
 
     totals: (blocks, TOTALS x (3 or 6), WIDTH), in double precision; both empty where they are not wanted.
@@ -48,7 +48,7 @@ class Record(NamedTuple):
     totals: FloatArray
 
 
-class Rows(NamedTuple):
+class BlockRows(NamedTuple):
     """What moves. volts: (1, steps, wheels, 1) that all robots share, or (those blocks, steps, wheels, WIDTH); states
     (1, blocks, 3 or 9, WIDTH): twist and pose; fails (blocks, WIDTH): the step from which on a robot is lost.
 

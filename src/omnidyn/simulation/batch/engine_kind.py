@@ -7,7 +7,7 @@ import numpy as np
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.exact.march import why_not_exact
+from omnidyn.simulation.exact.exact_march import why_not_exact
 
 EXACT, BOX, DIRECTION, GENERAL = "exact", "box", "direction", "general"
 LIMITED = {BOX: "box, limited", DIRECTION: "direction, limited"}  # motors with a current limit, or that coast

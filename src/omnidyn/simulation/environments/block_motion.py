@@ -20,8 +20,8 @@ import math
 import numpy as np
 
 from omnidyn.compiled.kernel import inlined, part
+from omnidyn.simulation.batch.block_march import DRIVE, POSE, SPEED
 from omnidyn.simulation.batch.implicit import ANGLE, BACKWARD, LAW, TURNING, advance_pose, put_stage
-from omnidyn.simulation.batch.march import DRIVE, POSE, SPEED
 from omnidyn.simulation.batch.pose import ALONE, DX, DY, END, NODE, TURN, move_on, rotation
 from omnidyn.simulation.environments.layout import (
     BOX_LAW,

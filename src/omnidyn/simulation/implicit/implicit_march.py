@@ -30,7 +30,7 @@ from omnidyn.model.stick_slip.step_bound import (
     longest_step,
 )
 from omnidyn.simulation.implicit.step import GAMMA, step
-from omnidyn.simulation.speed_loop import LoopCommands, close_loop, passed
+from omnidyn.simulation.speed_loop import LoopSettings, close_loop, passed
 
 MEMORY_BOUNDS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its MEMORY, within these bounds
 SHORT_STEP = 1.5e-4  # [s] no step is given less than the share of tol of one so long
@@ -107,7 +107,7 @@ def run_implicit(
     dt: FloatArray,
     state: PlantState,
     pose: FloatArray,
-    loop: LoopCommands,
+    loop: LoopSettings,
     tol: float,
     work: MarchWorkspace | None = None,
 ) -> Outcome:

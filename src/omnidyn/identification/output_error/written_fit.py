@@ -37,14 +37,15 @@ def better_of(solution: Solution, plain_solution: Solution) -> Solution:
         return solution
     margins = margins_of([solution, plain_solution])
     own_run, plain_run = free_run(solution, margins), free_run(plain_solution, margins)
-    if not plain_run.is_better(own_run):
+    comparison = plain_run.improvement(own_run)
+    if comparison is None:
         return replace(solution, plain_solution=plain_solution)
     lost = tuple(
         name.partition(AT)[0]
         for name in solution.solver.problem.names
         if name not in plain_solution.solver.problem.names
     )
-    numbers = {"nuisances": lost, "error": own_run.error, "plain": plain_run.error}
+    numbers = {"nuisances": lost, "error": own_run.error, "plain": plain_run.error, **comparison.counts}
     return replace(
         plain_solution, notes=(*solution.notes, Statement("plain_predicts_better", WARNING, numbers=numbers))
     )
@@ -71,7 +72,8 @@ def best_with_force(solution: Solution, forced_solutions: Sequence[Solution]) ->
         [free_run(forced_solution, margins) for forced_solution in forced_solutions],
     )
     k = int(np.argmin([run.error for run in runs]))
-    if run_without_force.adds_up or not runs[k].is_better(run_without_force):
+    comparison = runs[k].improvement(run_without_force)
+    if run_without_force.adds_up or comparison is None:
         return solution
     problem, values = forced_solutions[k].solver.problem, forced_solutions[k].state.point.values
     force_indices = [problem.where(name) for name in problem.names if name not in solution.solver.problem.names]
@@ -87,6 +89,7 @@ def best_with_force(solution: Solution, forced_solutions: Sequence[Solution]) ->
         "values": tuple(values[force_indices].tolist()),
         "error": run_without_force.error,
         "with": runs[k].error,
+        **comparison.counts,
     }
     notes = (*solution.notes, Statement("constant_force", WARNING, numbers=numbers))
     return replace(forced_solutions[k], plain_solution=solution.plain_solution, notes=notes)
@@ -96,9 +99,11 @@ def why_white(white: Solution, weighed_fit: Weighed) -> Statement | None:
     """Why least squares are taken in the place of a fit whose errors remember; None where they are not."""
     margins = margins_of([white])
     plain_run, own_run = free_run(white, margins), free_run(weighed_fit.solution, margins, weighed_fit.models)
-    if plain_run.adds_up or not plain_run.is_better(own_run):
+    comparison = plain_run.improvement(own_run)
+    if plain_run.adds_up or comparison is None:
         return None
-    return Statement("white_predicts_better", NOTE, numbers={"error": own_run.error, "white": plain_run.error})
+    numbers = {"error": own_run.error, "white": plain_run.error, **comparison.counts}
+    return Statement("white_predicts_better", NOTE, numbers=numbers)
 
 
 def beside_given(
@@ -135,12 +140,15 @@ def beside_given(
 
     def reference() -> HeldOut:
         fitted, plain_run, given_run = runs()
-        return HeldOut((given_run if is_given_better else fitted).error, plain_run.error, given_run.error)
+        return HeldOut((given_run if comparison else fitted).error, plain_run.error, given_run.error)
 
-    is_given_better = may_take_given and runs()[2].is_better(runs()[0])
+    comparison = runs()[2].improvement(runs()[0]) if may_take_given else None
     estimate = replace(estimate, reference=reference)
-    if not is_given_better:
-        return estimate
-    numbers = {"error": runs()[0].error, "given": runs()[2].error}
-    statement = Statement("given_predicts_better", WARNING, numbers=numbers)
-    return replace(estimate, robot=given_robot, warnings=(statement, *estimate.warnings))
+    numbers = {"error": runs()[0].error, "given": runs()[2].error} if may_take_given else {}
+    if comparison is not None:
+        statement = Statement("given_predicts_better", WARNING, numbers=numbers | comparison.counts)
+        return replace(estimate, robot=given_robot, warnings=(statement, *estimate.warnings))
+    if may_take_given and (of_tail := runs()[2].tail_improvement(runs()[0])) is not None:
+        statement = Statement("given_predicts_tail_better", WARNING, numbers=numbers | of_tail.counts)
+        return replace(estimate, warnings=(statement, *estimate.warnings))
+    return estimate

@@ -18,7 +18,7 @@ from omnidyn.errors import InputError
 from omnidyn.model.layout import N_AXES, Plant, Stage, new_stage, record
 from omnidyn.model.stick_slip.plant import copy_each, copy_row, signs_differ
 from omnidyn.model.stick_slip.step_bound import MONOTONE
-from omnidyn.simulation.implicit.march import SIMPSON, advance_pose
+from omnidyn.simulation.implicit.implicit_march import SIMPSON, advance_pose
 from omnidyn.simulation.slip.body import FREE, GRIPS, LINE
 from omnidyn.simulation.slip.bounds import (
     ERROR_SHARE,
@@ -31,9 +31,9 @@ from omnidyn.simulation.slip.bounds import (
 )
 from omnidyn.simulation.slip.plant import SlipPlant
 from omnidyn.simulation.slip.stage import SWEEPS, slip_step
-from omnidyn.simulation.speed_loop import LoopCommands, passed, tick_answer, tick_branch
+from omnidyn.simulation.speed_loop import LoopSettings, passed, tick_answer, tick_branch
 
-SHORT_STEP, SHORTEST_STEP, ROUNDING = 1.5e-4, 1e-11, 1e-13  # as in implicit/march.py
+SHORT_STEP, SHORTEST_STEP, ROUNDING = 1.5e-4, 1e-11, 1e-13  # as in implicit/implicit_march.py
 MOST_STEPS = (1e6, 5e6)  # steps solved at tol 1e-6, and so many more per second
 TURNS = 0.5  # [rad] by which travel may turn in a step
 SAME_SPEED = 1e-12  # of the speeds: a difference that is rounding
@@ -109,7 +109,7 @@ def run_slipping(
     dt: FloatArray,
     state: FloatArray,
     pose: FloatArray,
-    loop: LoopCommands,
+    loop: LoopSettings,
     tol: float,
 ) -> SlipOutcome:
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: a step a row.

@@ -1,4 +1,4 @@
-"""The way of a run since its start: how many numbers of it are wanted.
+"""Turn and travel of a run since its start: how many numbers of it are wanted.
 
 The heading th, the path s that the wheels have rolled along the body's own axes, and the place p, both from where the
 robot stood and along where it faced then:
@@ -8,5 +8,5 @@ robot stood and along where it faced then:
 
 from __future__ import annotations
 
-TURN, PATH, PLACE = 1, 3, 5  # numbers of the way: heading; path along x, y of the body; place along x, y at the start
+TURN, PATH, PLACE = 1, 3, 5  # numbers of it: heading; path along x, y of the body; place along x, y at the start
 SAME_TIME = 1e-9  # [s] times that differ by less are one

@@ -30,7 +30,7 @@ SLIPS = 1e-6  # [m/s] between the rim of a wheel and the floor under it
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class DrivenMotion:
     """A piece as the fitted robot drives it. t (n,); twist (n, 3), pose (n, 3); voltage (n, W) at the motors from each
     row on, current (n, W); share (n,): of the run that has gone by; decay (n - 1, S, S), gain (n - 1, S, 3): of a
     change of the twist, and per force, over a row; behind a speed loop with an integral S is 6, for the way of the
@@ -112,20 +112,20 @@ def _added_up(speed: FloatArray, step: FloatArray) -> FloatArray:
     return np.concatenate([np.zeros_like(speed[:1]), np.cumsum(0.5 * (speed[1:] + speed[:-1]) * step, axis=0)])
 
 
-def in_the_room(motion: Motion) -> FloatArray:
+def in_the_room(motion: DrivenMotion) -> FloatArray:
     """Forces on the centre of mass along x and along y of the room, as the body feels them. Shape (n, 2, 3)."""
     c, s = np.cos(motion.pose[:, YAW]), np.sin(motion.pose[:, YAW])
     x, y = motion.robot.body.centre
     return np.stack([np.stack([c, -s, -x * s - y * c], axis=1), np.stack([s, c, x * c - y * s], axis=1)], axis=1)
 
 
-def motions(problem: Problem, point: Point) -> list[Motion]:
+def motions(problem: Problem, point: Point) -> list[DrivenMotion]:
     """The motion of every piece at a point."""
     robot, (driver, _) = problem.robot_at(point.values), driver_of(problem, point.values)
     return [_motion(piece, robot, state, driver) for piece, state in zip(problem.pieces, point.states, strict=True)]
 
 
-def _motion(piece: Piece, robot: Robot, state: FloatArray, driver: Driver) -> Motion:
+def _motion(piece: Piece, robot: Robot, state: FloatArray, driver: Driver) -> DrivenMotion:
     record, rows = piece.record, slice(piece.first, piece.last)
     t, faces = record.t[piece.first : piece.last + 1], facing_at_start(piece, robot)
     if HEADING in record.columns:
@@ -143,7 +143,7 @@ def _motion(piece: Piece, robot: Robot, state: FloatArray, driver: Driver) -> Mo
     decay, gain = _answers(robot, run.twist, run.voltage, np.diff(t), rolls)
     current = settled_current(robot.motor, run.voltage, run.wheel_speed)
     share = record.share[piece.first : piece.last + 1]
-    return Motion(piece, robot, t, run.twist, run.pose, run.voltage, current, share, decay, gain, rolls)
+    return DrivenMotion(piece, robot, t, run.twist, run.pose, run.voltage, current, share, decay, gain, rolls)
 
 
 def _ideal(robot: Robot) -> Robot:

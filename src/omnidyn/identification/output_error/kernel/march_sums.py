@@ -25,7 +25,7 @@ from omnidyn.compiled.kernel import kernel, part
 from omnidyn.identification.output_error.kernel.counts import count_terms
 from omnidyn.identification.output_error.kernel.pull import add_pull
 from omnidyn.model.actuation import Driver, at_motor
-from omnidyn.simulation.exact.march import rotated
+from omnidyn.simulation.exact.exact_march import rotated
 from omnidyn.simulation.exact.position import move_on, put_displacement
 from omnidyn.simulation.exact.slopes import acceleration_at_end, hold_slopes, step_slopes, travel_slopes
 

@@ -15,7 +15,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import copy_row, copy_state, copy_table, row_of_state, state_of_row
 from omnidyn.model.stick_slip.release import settle, start_state, sticks
 from omnidyn.simulation.commands import Commands, current_bounds, loop_gains, on_ticks
-from omnidyn.simulation.implicit.march import (
+from omnidyn.simulation.implicit.implicit_march import (
     SIMPSON,
     STAGES,
     Outcome,
