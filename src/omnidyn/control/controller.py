@@ -55,6 +55,7 @@ DOUBTS = {
     SLIPPED: "twist disagrees with poses: corrected",
     REPEATED: "measurement repeated: moved on",
 }
+SWINGS = "swings: correct latency_s of [drive], or lower the gains"
 MOST_BRIDGED = 2  # measurements missing in a row
 LATEST = 1.5  # steps after the one before: what comes later is not gone on from
 MOST_SUPPLY = 1e4  # [V]
@@ -81,7 +82,7 @@ class Info:
     @property
     def ok(self) -> bool:
         """Whether the output is what the controller wanted to send: for a path that ended or a doubtful state, too."""
-        return self.status in (OK, PATH_ENDED, *DOUBTS.values())
+        return self.status in (OK, PATH_ENDED, SWINGS, *DOUBTS.values())
 
 
 class Followed(Protocol):
@@ -150,6 +151,7 @@ class Safe:
     name = "controller"
     dt: float  # [s] between two steps
     _filtered_twist: FilteredTwist | None = None
+    _swinging = False
 
     def __init__(self, robot: Robot, supply: float | None = None) -> None:
         self.supply = supply
@@ -228,6 +230,8 @@ class Safe:
         if not fine:
             return self._safe(FAILED, start)
         self._last = sent
+        if self._swinging and status in (OK, PATH_ENDED):
+            status = SWINGS
         self.info = Info(status, time=time.perf_counter() - start, limits=limits)
         return sent.copy()
 

@@ -37,6 +37,7 @@ from omnidyn.control.speed_loop import (
     pole_rate,
     pose_gains,
 )
+from omnidyn.control.swing import Swing
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.inverse import Effort
 from omnidyn.model.robot import Robot
@@ -93,6 +94,7 @@ class Pid(Guarded):
     def _take(self, robot: Robot) -> None:
         super()._take(robot)
         self.late = lateness(robot, self.delay, self.dt)
+        self._swing = Swing(robot, self.dt)
         self._ahead = Ahead(self.dt, self.late, vars(self).get("_ahead"))
         if self.output == WHEEL_SPEED:
             self.commands = LoopCommands(robot, self.dt, self.friction)
@@ -129,6 +131,7 @@ class Pid(Guarded):
         """Forget all steps."""
         super().reset()
         self._sum = (0.0, 0.0, 0.0)
+        self._swing.reset()
         self._forget_loop()
 
     def _safe(self, word: str, start: float) -> FloatArray:
@@ -146,13 +149,18 @@ class Pid(Guarded):
     ) -> tuple[FloatArray, tuple[str, ...]]:
         place, velocity = self._ahead.at(t, path)
         x, y, heading = pose.tolist()
+        vx, vy, omega = speed = tuple(twist.tolist())
+        cos, sin, (east, north) = math.cos(heading), math.sin(heading), velocity[:2]
+        self._swinging = self._swing.found(
+            t, vx - cos * east - sin * north, vy + sin * east - cos * north, omega - velocity[2]
+        )
         off = place[0] - x, place[1] - y, math.remainder(place[2] - heading, 2.0 * math.pi)
         dt = min(dt, MOST_STEPS * self.dt)
         sum_x, sum_y, sum_heading = self._sum
         raised_sum = sum_x + off[0] * dt, sum_y + off[1] * dt, sum_heading + off[2] * dt
         if self.output == WHEEL_SPEED:
-            return self._commanded(dt, off, heading, tuple(twist.tolist()), velocity, raised_sum)
-        speed, count = tuple(twist.tolist()), len(self._zeros)
+            return self._commanded(dt, off, heading, speed, velocity, raised_sum)
+        count = len(self._zeros)
         for total in (raised_sum, self._sum):  # at a limit, nothing is added to the sum
             found = self._law(off, heading, speed, velocity, total)
             sent, met = self._within(found[:count], found[count:])

@@ -121,7 +121,9 @@ def test_what_was_exchanged_with_the_dead_encoder_starts_no_tale(log, robot, wit
     assert grave(check(with_channels(wheel_speed=speed), robot)) == {"dead"}
 
 
-@pytest.mark.parametrize("name, code", [("i1_A", -999.0), ("w1_rad_s", 65535.0), ("supply_V", 9999.0), ("x_m", -9999.0)])
+@pytest.mark.parametrize(
+    "name, code", [("i1_A", -999.0), ("w1_rad_s", 65535.0), ("supply_V", 9999.0), ("x_m", -9999.0)]
+)
 def test_a_code_in_some_rows_asks_for_no_other_unit(tmp_path, name, code):
     """From the file on: it is the channel that is named, not its unit, however many rows hold the code."""
     t, draw = np.arange(600) / 100.0, np.random.default_rng(0)

@@ -32,6 +32,7 @@ from omnidyn.control.controller import (
     MOST_BRIDGED,
     OK,
     PATH_ENDED,
+    SWINGS,
     TIME_STANDS_STILL,
     VOLTAGE,
     WAITING,
@@ -54,6 +55,7 @@ from omnidyn.control.mpc.observer import PUSH, SCALE
 from omnidyn.control.mpc.settings import FILTERED, Preview, Settings
 from omnidyn.control.pose_estimator import PoseEstimator, pose_estimator
 from omnidyn.control.pose_gate import TRUSTED, PoseGate
+from omnidyn.control.swing import Swing
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope
@@ -141,6 +143,7 @@ class Mpc:
         self._tables = self.robot_settings.tables(driven, self.dt, self.observer)
         self._filtered_twist = filtered_twist(robot, self._filtered_twist)
         self._gate = PoseGate(robot, self.dt, vars(self).get("_gate"))
+        self._swing = Swing(robot, self.dt)
         self._control = None  # compiled by the first step
 
     def reset(self) -> None:
@@ -149,7 +152,7 @@ class Mpc:
         self._known, self._t, self._last = False, math.nan, self._zeros.copy()
         self._asked: tuple[str, int, float] = (WAITING, 0, 0.0)
         self._state, self._missing, self._since = np.zeros(6), 0, math.nan
-        for sensor in (self._estimator, self._filtered_twist, self._gate):
+        for sensor in (self._estimator, self._filtered_twist, self._gate, self._swing):
             if sensor is not None:
                 sensor.reset()
 
@@ -203,7 +206,7 @@ class Mpc:
     def info(self) -> Info:
         """What the last step did."""
         status, iterations, took = self._asked
-        if status not in (OK, PATH_ENDED, INACCURATE, *DOUBTS.values()):
+        if status not in (OK, PATH_ENDED, INACCURATE, SWINGS, *DOUBTS.values()):
             return Info(status, iterations, took)
         return Info(status, iterations, took, self._memory.x[1:, :3].copy(), self._met())
 
@@ -282,7 +285,9 @@ class Mpc:
         if self.output != VOLTAGE:
             sent = np.clip(sent, -self.limit, self.limit)
         self._last = sent
-        status = INACCURATE if inaccurate else PATH_ENDED if t > preview.end else OK
+        wanted, (vx, vy, omega) = preview.rows[row - preview.late, 3:].tolist(), self._state[3:].tolist()
+        swinging = self._swing.found(float(t), vx - wanted[0], vy - wanted[1], omega - wanted[2])
+        status = INACCURATE if inaccurate else SWINGS if swinging else PATH_ENDED if t > preview.end else OK
         self._asked = (status, passes, time.perf_counter() - start)
         return sent.copy()
 
