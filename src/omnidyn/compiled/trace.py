@@ -284,8 +284,7 @@ class StatementWriter:
         return self.names[text]
 
 
-# The same as a function of plain numbers: NumPy takes a microsecond for each operation, Python a fiftieth of that
-
+# As a function of plain numbers: NumPy takes a microsecond for each operation, Python a fiftieth of that
 _PYTHON: dict[str, str] = {
     **{sign: f"({{0}} {sign} {{1}})" for sign in ("+", "-", "*", "/", ">", ">=", "<", "<=", "==", "and", "or")},
     **{name: f"{name}({{0}})" for name in ("abs", "sqrt", "cos", "sin", "exp")},

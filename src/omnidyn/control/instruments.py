@@ -224,8 +224,8 @@ class Readings:
         random: np.random.Generator | None = None,
     ) -> None:
         sensors = kit.sensors
-        told = np.array([sensors.pose_noise or 0.0] * 2 + [sensors.heading_noise or 0.0, 0.0, 0.0, 0.0])
-        self._kit, self._live, self._noise = kit, live, np.hypot(noise, told)
+        in_file = np.array([sensors.pose_noise or 0.0] * 2 + [sensors.heading_noise or 0.0, 0.0, 0.0, 0.0])
+        self._kit, self._live, self._noise = kit, live, np.hypot(noise, in_file)
         self._random = random or np.random.default_rng(0)
         self._bias = (
             (sensors.gyro_bias or 0.0) * float(self._random.standard_normal()) if sensors.has_gyroscope else 0.0

@@ -179,9 +179,9 @@ def tell_kind(memory, numbers, passed, pose, state):
     )
     turn_off = pose[2] - memory[LAST, 2] - turn
     turn_off -= TURN * round(turn_off / TURN)
-    way = math.hypot(x, y)
-    if way + abs(turn) > TINY:
-        alike = (off <= ALIKE * way + TINY) & (abs(turn_off) <= ALIKE * abs(turn) + TINY)
+    moved = math.hypot(x, y)
+    if moved + abs(turn) > TINY:
+        alike = (off <= ALIKE * moved + TINY) & (abs(turn_off) <= ALIKE * abs(turn) + TINY)
         memory[KIND] = COUNTED if alike & (memory[KIND] != OLD) else OLD
 
 

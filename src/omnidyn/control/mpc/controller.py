@@ -132,8 +132,8 @@ class Mpc:
             self._room.rest[:] = numbers(driven, rest, self.friction, loop).linear
         self._numbers = numbers(driven, self.dt, self.friction, loop)
         noise = self.settings.pose_noise
-        told = None if noise is None else (noise[0], noise[2])
-        self._estimator = pose_estimator(robot, self.dt, self._estimator, told)
+        given = None if noise is None else (noise[0], noise[2])
+        self._estimator = pose_estimator(robot, self.dt, self._estimator, given)
         self.robot_settings = self.settings.of(robot, self.dt, None if loop is None else driven)
         self.observer_settings = self.robot_settings
         if self._estimator is not None:
