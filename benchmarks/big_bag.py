@@ -76,8 +76,8 @@ def write(path: Path, megabytes: float) -> int:
     """A recording of about so many megabytes, lz4; the number of messages of wheels and odometry."""
     from mcap.writer import CompressionType, Writer
 
-    from omnidyn.logs.mcap_run import Packer
-    from omnidyn.logs.readers.ros.layout import definition_of
+    from omnidyn.logs.cdr import Packer
+    from omnidyn.logs.readers.ros.definitions import definition_of
 
     rng, count, row = np.random.default_rng(0), 0, 0
     names = [f"wheel_{k}" for k in (1, 2, 3, 4)]

@@ -13,7 +13,7 @@ from omnidyn.comparison.compare import compare
 from omnidyn.comparison.result import Comparison
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
-from omnidyn.paper.experiments import prbs
+from omnidyn.paper.voltage_programs import prbs
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 

@@ -24,7 +24,7 @@ from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from omnidyn.arrays import FloatArray
 from omnidyn.export.code.fmu import OUTPUTS
-from omnidyn.model.motor import Drive
+from omnidyn.model.drive import Drive
 from omnidyn.model.robot import Robot
 from tests.support.exported import WARNINGS, Stepper, init_robot, program
 from tests.support.random_calls import VALID, of_step

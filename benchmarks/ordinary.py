@@ -17,17 +17,19 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from benchmarks import ordinary_sysid
+from benchmarks.identify_peers import INSTALL, installed_sysid
 from benchmarks.ordinary_robots import RATE, Robot, robots, write_log
 from benchmarks.size import SMALLEST
 from benchmarks.table import Table, Times, machine, one_core
 from omnidyn.cli import main as omnidyn
+from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.fit import Fit
@@ -69,8 +71,6 @@ def measure(names: Sequence[str] = (), parts: Sequence[str] = PARTS) -> Table:
         f"{QUICK}, {DEFAULT}: `omnidyn identify` of both logs, with and without --quick, from what `init` guesses",
         f"{EXCEPTION}: friction at the wheels is outside the march of ordinary robots; its rows have no goal",
     ]
-    words = "importable, but no set-up of it is part of this benchmark" if find_spec("mujoco") else "not installed"
-    table.notes.append(f"mujoco.sysid: {words}")
     return table
 
 
@@ -110,6 +110,16 @@ def _measure_robot(table: Table, robot: Robot, parts: Sequence[str], folder: Pat
     if PEER in parts and robot.name == PEER_ROBOT:
         cpu, count, note = plain_least_squares(runs, model)
         table.add(robot=robot.name, what="scipy least_squares", cpu=cpu, unit="s", evaluations=count, note=note)
+        start = time.process_time()
+        ours = identify(list(runs), model, OutputError()).estimate.robot
+        cpu, words = time.process_time() - start, ordinary_sysid.errors(ordinary_sysid.numbers_of(ours), robot.world)
+        table.add(robot=robot.name, what="omnidyn beside mujoco.sysid", cpu=cpu, unit="s", note=words)
+        if installed_sysid() is None:
+            table.notes.append(f"mujoco.sysid skipped: not installed here ({INSTALL})")
+            return
+        found, cpu = ordinary_sysid.fit(runs, ordinary_sysid.numbers_of(model), robot.world)
+        words = ordinary_sysid.errors(found, robot.world)
+        table.add(robot=robot.name, what="mujoco.sysid", cpu=cpu, unit="s", note=words)
 
 
 def _initial(robot: Robot, file: Path) -> None:

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 import omnidyn
+from omnidyn.model.drive import Drive
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
-from omnidyn.model.motor import Drive, Motor
+from omnidyn.model.motor import Motor
 from omnidyn.model.robot import Body, Robot
 from omnidyn.model.wheels import Wheels
 

@@ -123,7 +123,7 @@ _MAKERS = {
     shown.FIGURE: ("omnidyn.report.plots", "plot"),
     shown.ANIMATION: ("omnidyn.report.figures.moving", "animate"),
     shown.FRAME: ("omnidyn.interop.dataframe", "to_dataframe"),
-    shown.DATASET: ("omnidyn.interop.runs", "to_xarray"),
+    shown.DATASET: ("omnidyn.interop.dataset", "to_xarray"),
     shown.RUN: ("omnidyn.interop.runs", "run_of"),
     shown.SYSTEM: ("omnidyn.interop.systems", "linear_system"),
     shown.SENTENCE: ("omnidyn.telling.codes", "sentence"),

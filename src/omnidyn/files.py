@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
+import math
 import os
 import re
 import shlex
@@ -376,8 +377,15 @@ def _umask() -> int:
     return mask
 
 
+_CLEANED: dict[Path, float] = {}  # folder -> when this process cleaned it last: a list of ten thousand files takes time
+
+
 def _remove_stale(folder: Path) -> None:
     """Clean up what a killed process left behind; a young file may belong to a process still at work."""
+    now = time.monotonic()
+    if now - _CLEANED.get(folder, -math.inf) < STALE_TEMPORARY_S:
+        return
+    _CLEANED[folder] = now
     for leftover in folder.glob(TEMPORARY_PREFIX + "*"):
         with contextlib.suppress(OSError):
             if time.time() - leftover.stat().st_mtime > STALE_TEMPORARY_S:

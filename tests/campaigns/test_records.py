@@ -5,7 +5,6 @@ import random
 import re
 import shutil
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 
@@ -53,12 +52,9 @@ def same_record(damaged, whole):
 
 def followed(error, folder):
     """Do what a remedy says; the hash of what is merged then."""
-    files, resume = re.fullmatch(r"delete (.*), then make it again: omnidyn sweep resume (.*)", error.remedy).groups()
-    assert resume == str(folder)
-    for file in files.split():
-        Path(file).unlink()
+    assert re.fullmatch(rf"make it( and \d+ more)? again: omnidyn sweep resume {folder} --repair", error.remedy)
     with ThreadPoolExecutor(1) as thread:
-        campaign = sweep(None, folder, task=product, executor=thread)
+        campaign = sweep(None, folder, task=product, executor=thread, repair=True)
     return sha256(campaign.folder.merge().read_bytes())
 
 
@@ -79,7 +75,7 @@ def test_a_shard_that_changed_is_named_by_all_who_read_it(copied, finished, name
 def test_no_flip_of_a_bit_is_silent(copied, finished):
     """As `bit_flips.py` of the cases: 147 of 200 changed the merged numbers without an error."""
     draw = random.Random(0)
-    for ending, count in ((".parquet", 150), (".json", 150)):
+    for ending, count in ((".parquet", 500), (".json", 500)):
         path = copied / "shards" / f"00001{ending}"
         whole = path.read_bytes()
         for _ in range(count):
@@ -108,9 +104,28 @@ def test_a_shard_that_belongs_elsewhere_is_named(copied, finished, tmp_path):
         sweep(SMALL | {"seed": 7}, tmp_path / "other", task=product, executor=thread)
     for ending in (".parquet", ".json"):
         shutil.copy(tmp_path / "other" / "shards" / f"00001{ending}", shards)
-    with pytest.raises(InputError, match=r"this shard belongs to another manifest; got .*00001") as caught:
+    with pytest.raises(InputError, match=r"00001.*this shard belongs to another manifest") as caught:
         load_campaign(copied).folder.merge()
     assert followed(caught.value, copied) == finished[1]
+
+
+def test_no_swap_of_shards_is_silent(copied, finished, tmp_path):
+    """A shard, its record or both in the place of another, of this campaign or of one with another seed."""
+    with ThreadPoolExecutor(1) as thread:
+        sweep(SMALL | {"seed": 7}, tmp_path / "other", task=product, executor=thread)
+    whole = {path.name: path.read_bytes() for path in (copied / "shards").iterdir()}
+    strange = {path.name: path.read_bytes() for path in (tmp_path / "other" / "shards").iterdir()}
+    draw = random.Random(1)
+    for _ in range(100):
+        source, (taken, given) = draw.choice((whole, strange)), draw.sample(range(3), 2)
+        endings = draw.choice(((".parquet",), (".json",), (".parquet", ".json")))
+        for ending in endings:
+            (copied / "shards" / f"{taken:05d}{ending}").write_bytes(source[f"{given:05d}{ending}"])
+        with pytest.raises(InputError, match=f"{taken:05d}"):
+            load_campaign(copied).folder.merge()
+        for name, content in whole.items():
+            (copied / "shards" / name).write_bytes(content)
+    assert sha256(load_campaign(copied).folder.merge().read_bytes()) == finished[1]
 
 
 def test_an_empty_shard_and_an_empty_record_are_named(copied, finished):

@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from omnidyn.cli import main
-from omnidyn.cli.demo import MARKER, check_folder, write_folder
+from omnidyn.cli.demo_folder import MARKER, check_folder, write_folder
 from omnidyn.cli.terminal.streams import width
 from omnidyn.errors import InputError
 from omnidyn.paper.claim import ClaimVerdict
@@ -114,7 +114,7 @@ def test_a_damaged_marker_removes_nothing_outside(tmp_path, marker):
 
 
 def test_a_demo_that_was_killed_can_be_done_again(tmp_path, monkeypatch):
-    import omnidyn.cli.demo as module
+    import omnidyn.cli.demo_folder as module
 
     folder = tmp_path / "demo"
     real = module.write_atomic

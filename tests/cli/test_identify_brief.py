@@ -2,7 +2,7 @@
 
 from types import SimpleNamespace
 
-from omnidyn.cli.identify_show import brief
+from omnidyn.cli.identify_brief import brief
 from omnidyn.cli.terminal.telling import BRIEF_LINES
 from omnidyn.statement import ERROR, WARNING, quoted
 

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from omnidyn.comparison.compare import compare, with_bands
+from omnidyn.comparison.compare import compare
+from omnidyn.comparison.model_bands import with_bands
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.figures.overlay import draw_overlay

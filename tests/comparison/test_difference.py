@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.comparison.metrics import difference
+from omnidyn.comparison.nearer_model import difference
 from omnidyn.comparison.traces import Trace
 
 

@@ -5,16 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from omnidyn.comparison.errors_from_start import errors_for_whiteness, settled
 from omnidyn.comparison.metrics import metrics
-from omnidyn.comparison.traces import (
-    Trace,
-    compared_components,
-    errors_for_whiteness,
-    settled,
-    trace_of,
-    unit,
-    unwrapped,
-)
+from omnidyn.comparison.traces import Trace, compared_components, trace_of, unit, unwrapped
 from omnidyn.run import Run
 
 N = 1000

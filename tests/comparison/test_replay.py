@@ -8,8 +8,8 @@ from scipy.linalg import expm
 
 from omnidyn.comparison.replay import choose_input, held_inputs, replay
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.model.drive import Drive
 from omnidyn.model.friction import AxesFriction, Friction
-from omnidyn.model.motor import Drive
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
-from omnidyn.comparison.metrics import whiteness
+from omnidyn.comparison.whiteness import whiteness
 
 TRIALS = 600
 

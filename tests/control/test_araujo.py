@@ -7,7 +7,7 @@ import omnidyn
 from omnidyn.control.controllers import controller_named
 from omnidyn.control.paths.path import path
 from omnidyn.errors import UnsupportedError
-from omnidyn.model.motor import Drive
+from omnidyn.model.drive import Drive
 
 pytest.importorskip("clarabel")
 ROBOT = omnidyn.load_robot("axebot")

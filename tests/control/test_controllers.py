@@ -31,8 +31,8 @@ from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import SpeedLoop
 from omnidyn.errors import InputError, Terminated
+from omnidyn.model.drive import Drive
 from omnidyn.model.log_effects import Sensors
-from omnidyn.model.motor import Drive
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.live import LiveRobot
 from tests.support.friction_shapes import shaped

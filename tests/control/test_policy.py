@@ -10,8 +10,8 @@ import omnidyn
 from omnidyn.control.controller import BAD_POSE, OK
 from omnidyn.control.policy import Policy, load_policy, policy_of, save_policy
 from omnidyn.errors import InputError
+from omnidyn.model.drive import Drive
 from omnidyn.model.log_effects import Sensors
-from omnidyn.model.motor import Drive
 from omnidyn.simulation.environments.environments import Environments, Setting
 from omnidyn.simulation.environments.layout import columns_of
 

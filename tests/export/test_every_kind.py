@@ -18,7 +18,7 @@ import omnidyn
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.features import FEATURES, LEAVES_OUT, PARTLY, REFUSES, cell
 from omnidyn.export.kinds import KINDS, maker
-from omnidyn.model.motor import Drive
+from omnidyn.model.drive import Drive
 from tests.support.exported import STRICT, exact_robot, sloping
 from tests.support.mixed_robots import random_robot, with_centre, with_spin
 

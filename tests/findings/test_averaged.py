@@ -11,7 +11,7 @@ from omnidyn.identification.motors.window_fit import fit_line
 from omnidyn.identification.motors.windows import motor_windows
 from omnidyn.logs.log import Log
 from omnidyn.logs.read_log import load_log
-from omnidyn.logs.resolved import rows_of_mean
+from omnidyn.logs.window_means import rows_of_mean
 from omnidyn.run import Run
 from tests.findings.redundant import ROBOT, recorded
 from tests.support.cases import case

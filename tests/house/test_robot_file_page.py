@@ -7,7 +7,7 @@ import pytest
 
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot, parse_robot, preset_names
-from omnidyn.model.surroundings import Variations
+from omnidyn.model.variations import Variations
 from tests.support.robot_keys import KEYS, MADE
 
 ROOT = Path(__file__).resolve().parents[2]

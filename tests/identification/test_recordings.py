@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.grouping import count_once
+from omnidyn.identification.fingerprints import count_once
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.model.robot_file import load_robot

@@ -8,7 +8,8 @@ import pytest
 
 from omnidyn.errors import InputError, OmnidynError
 from omnidyn.interop.kinds import import_robot
-from omnidyn.interop.mjcf import MOST_PARTS, _compiled, robot_of_mjcf
+from omnidyn.interop.mjcf import _compiled, robot_of_mjcf
+from omnidyn.interop.mjcf_parts import MOST_PARTS
 from omnidyn.interop.robot_json import robot_of_json
 from omnidyn.interop.urdf import robot_of_urdf
 from tests.interop.test_imports import kiwi, model_wheels

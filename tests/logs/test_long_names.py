@@ -14,10 +14,10 @@ from omnidyn.interop.robot_json import robot_of_json
 from omnidyn.logs.columns.mapping import parse_column
 from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.read_log import read_log
-from omnidyn.logs.readers import text
+from omnidyn.logs.readers import spaced_text
 from omnidyn.logs.readers.read_table import read_table
-from omnidyn.logs.readers.ros.layout import parse_definition
-from omnidyn.logs.readers.wpilog import leaves_of
+from omnidyn.logs.readers.ros.definitions import parse_definition
+from omnidyn.logs.readers.wpilib_structs import leaves_of
 from omnidyn.logs.run_file import write_run
 from omnidyn.logs.table import dialect
 from omnidyn.logs.table.dialect import MAX_NAME
@@ -76,7 +76,7 @@ READERS = {
     "brackets": dialect.split_unit,
     "cell": dialect.looks_like_number,
     "row": dialect.looks_like_data,
-    "spaces": text.cells,
+    "spaces": spaced_text.cells,
     "threshold": parse_threshold,
     "key": Key.parse,
     "column": lambda text: parse_column(f"u1={text}"),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.logs.segments import on_clock_of, on_clock_of_wheels
+from omnidyn.logs.sensor_rows import on_clock_of, on_clock_of_wheels
 from omnidyn.run import Run
 
 STEP = 0.02

@@ -3,9 +3,9 @@
 import pytest
 
 from omnidyn.errors import InputError
+from omnidyn.model.drive import Drive
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import BOX, TORQUE, Key, all_keys, expand, find_key, friction_keys, gain_keys, unit, with_priors
-from omnidyn.model.motor import Drive
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot, parse_robot, preset_names, robot_to_toml
 from omnidyn.model.wheels import Wheels

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from omnidyn.model.deadzone import axis_patterns, dead_zone_force
-from omnidyn.model.motor import SPEED
+from omnidyn.model.drive import SPEED
 from omnidyn.model.robot_file import PRESETS, load_robot, parse_robot, preset_names, robot_to_toml
 from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
 from omnidyn.simulation.simulate import simulate

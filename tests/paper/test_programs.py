@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.paper import experiments as inputs
+from omnidyn.paper import voltage_programs as inputs
 
 
 def test_steps_hold_each_row():

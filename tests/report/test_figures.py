@@ -22,7 +22,7 @@ from omnidyn.report.style import AXIS_COLOUR, LEVEL_COLOURS, LOOK, look, new_fig
 from tests.support.figures import shown_texts
 
 NAMES = ["fig1_robot", "fig2_traces", "fig3_friction", "fig4_steps", "fig5_dead_zone", "fig6_reconcile"]
-MODULES = ["robot", "paper_pictures"]
+MODULES = ["robot", "paper_dead_zone", "paper_friction", "paper_reconciliation", "paper_steps", "paper_traces"]
 
 
 def size_of(png):

@@ -9,7 +9,8 @@ import omnidyn
 from omnidyn.findings.finding import Finding
 from omnidyn.identification.fit_document import number_table, verdict_table
 from omnidyn.logs.log import Log
-from omnidyn.report.figures.residuals import draw_correlation, draw_residuals
+from omnidyn.report.figures.correlations import draw_correlation
+from omnidyn.report.figures.residuals import draw_residuals
 from omnidyn.report.fit_page import _noise, render_fit
 from omnidyn.statement import ERROR
 from tests.support.axebot_logs import excitation

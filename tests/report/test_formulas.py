@@ -2,7 +2,7 @@
 
 import pytest
 
-from omnidyn.report.page import formula
+from omnidyn.report.formulas import formula
 
 
 @pytest.mark.parametrize(

@@ -8,13 +8,13 @@ from benchmarks.wrong_worlds.log import robot_of
 from benchmarks.wrong_worlds.world import World, drive
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moving_axes
+from omnidyn.model.drive import Drive
 from omnidyn.model.keys import Key
 from omnidyn.model.log_effects import Lateness, LogEffects
-from omnidyn.model.motor import Drive
 from omnidyn.model.surroundings import Floor
+from omnidyn.simulation.delays import clock
 from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
-from omnidyn.simulation.view import clock
 
 DEAD, LATE = 0.7, 0.0173
 WORLD = World(dead=DEAD)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
+from omnidyn.model.drive import Drive
 from omnidyn.model.friction import AxesFriction, Friction
-from omnidyn.model.motor import Drive
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 

@@ -11,8 +11,8 @@ from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.identification.methods import OutputError
 from omnidyn.model.actuation import asked_for, reaching
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map
+from omnidyn.model.drive import Drive
 from omnidyn.model.keys import all_keys
-from omnidyn.model.motor import Drive
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
 from omnidyn.simulation.live import LiveRobot
 from omnidyn.simulation.sensitivity.derivatives import derivatives

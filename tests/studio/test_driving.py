@@ -9,7 +9,8 @@ import pytest
 
 import omnidyn
 from omnidyn.model.friction import DirectionFriction, Friction
-from omnidyn.model.surroundings import Floor, Surface, Variations
+from omnidyn.model.surroundings import Floor
+from omnidyn.model.variations import Surface, Variations
 from omnidyn.studio.drive.job import DrivenRobot
 from omnidyn.studio.worker import CancelledError, JobError, Worker
 

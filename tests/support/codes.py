@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from omnidyn.logs.columns.guessed import Doubt
+from omnidyn.logs.columns.doubts import Doubt
 from omnidyn.statement import Statement
 
 

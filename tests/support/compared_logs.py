@@ -3,7 +3,7 @@
 import numpy as np
 
 from omnidyn.model.robot import Robot
-from omnidyn.paper.experiments import prbs
+from omnidyn.paper.voltage_programs import prbs
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 

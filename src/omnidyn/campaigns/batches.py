@@ -187,7 +187,7 @@ def _tracking(
         off[counted].max(axis=0),
         off[-1],
         np.sqrt(np.mean(error[counted][..., 2] ** 2, axis=0)),
-        np.array([settled_from(t, way, loop.settling) for way in off.T]),
+        np.array([settled_from(t, distance, loop.settling) for distance in off.T]),
         np.mean((np.abs(sent) >= limit * (1.0 - ON_LIMIT)).any(axis=2), axis=0),
         np.sqrt(np.mean(volts**2, axis=(0, 2))),
         changes,
@@ -258,7 +258,9 @@ def _measured(problem: LoadedSpec, sample: Sample, rows: FloatArray, dt: float, 
     rim = np.array([1.0, 1.0, float(np.mean(robot.wheels.robot_radius))])
     off = np.linalg.norm((run.twists - run.twists[:, -1:]) * rim, axis=2)
     bound = SETTLED * np.linalg.norm(run.twists[:, -1] * rim, axis=1)
-    measured["settling_s"] = np.array([settled_from(run.t, way, end) for way, end in zip(off, bound, strict=True)])
+    measured["settling_s"] = np.array(
+        [settled_from(run.t, distance, end) for distance, end in zip(off, bound, strict=True)]
+    )
     mean = 0.5 * (run.twists[:, 1:] + run.twists[:, :-1])
     turning = _wheel_speeds(problem, sample, mean.swapaxes(0, 1)).swapaxes(0, 1)
     measured["energy_J"] = np.sum(volts * settled_current(robot.motor, volts, turning), axis=(1, 2)) * dt

@@ -28,7 +28,6 @@ from omnidyn.logs.readers.parquet import import_pyarrow
 
 MANIFEST, SHARDS, LOCK, MERGED = "manifest.json", "shards", "lock", "merged.parquet"
 DONE, RECORD, FAILED = ".parquet", ".json", ".failed"
-NAMED = 5  # damaged shards that a remedy names
 SAMPLE = "sample"
 GROUP_ROWS = 2**16  # rows of a group of the merged file
 WORD = "omnidyn campaign"
@@ -233,20 +232,37 @@ class Folder:
 
     def done(self, shards: Iterable[int]) -> tuple[int, ...]:
         """Those of some shards that are there, with a record. Raises InputError where one differs from its record."""
-        manifest, done, faults = self.manifest, list[int](), dict[Path, tuple[str, str, str]]()
+        done, faults = self._judged(shards)
+        if faults:
+            shard, (what, got, expected) = next(iter(faults.items()))
+            count = "it" if len(faults) == 1 else f"it and {len(faults) - 1} more"
+            raise InputError(
+                what,
+                got=got,
+                expected=expected,
+                remedy=f"make {count} again: omnidyn sweep resume {self.path} --repair",
+                where=str(self.shard_path(shard)),
+            )
+        return tuple(done)
+
+    def _judged(self, shards: Iterable[int]) -> tuple[list[int], dict[int, tuple[str, str, str]]]:
+        """Those of some shards that are there, with a record; what of these differs from its record."""
+        manifest, done, faults = self.manifest, list[int](), dict[int, tuple[str, str, str]]()
         for shard in shards:
             path, record = self.shard_path(shard), self.shard_path(shard, RECORD)
             if path.exists() and record.exists():
                 done.append(shard)
                 if fault := ShardRecord(file_sha256(path), manifest.rows(shard), manifest.sha256).fault(record):
-                    faults[path] = fault
-        if faults:
-            path, (what, got, expected) = next(iter(faults.items()))
-            files, more = " ".join(map(str, [*faults][:NAMED])), len(faults) - NAMED
-            some = f"{files} and {more} more" if more > 0 else files
-            remedy = f"delete {some}, then make it again: omnidyn sweep resume {self.path}"
-            raise InputError(what, got=got, expected=expected, remedy=remedy, where=str(path))
-        return tuple(done)
+                    faults[shard] = fault
+        return done, faults
+
+    def remove_damaged(self, shards: Iterable[int]) -> tuple[int, ...]:
+        """Delete those of some shards that differ from their records, and say which: they are to be made again."""
+        damaged = tuple(self._judged(shards)[1])
+        for shard in damaged:
+            self.shard_path(shard, RECORD).unlink(missing_ok=True)
+            self.shard_path(shard).unlink(missing_ok=True)
+        return damaged
 
     def write_shard(self, shard: int, columns: Mapping[str, Any]) -> None:
         """Write a shard, then its record. Raises InputError where they cannot be written: a full disk."""

@@ -44,6 +44,7 @@ def sweep(
     workers: int | None = None,
     scheduler: str = "",
     shard: tuple[int, int] = (1, 1),
+    repair: bool = False,
     progress: Progress = silent,
 ) -> Campaign:
     """Run a campaign into a folder, or go on with it: what is there is not run again. Returns a Campaign.
@@ -56,6 +57,7 @@ def sweep(
         workers: Processes of that pool; by default as many as there are processors.
         scheduler: Address of a Dask cluster that runs already, in place of an executor.
         shard: (i, n): only the i-th of n parts of the shards, such as one task of an array of Slurm.
+        repair: Make shards that have changed since they were written again; else they are an error.
         progress: Hears how many shards are done, and how long the others take.
 
     Raises InputError for a spec that cannot be used, a folder of another campaign or with a run in it, a full disk.
@@ -69,6 +71,8 @@ def sweep(
         start, stop = ((manifest.shards * k) // parts for k in (part - 1, part))
         if start < stop:
             with home.locked(start, stop):
+                if repair and (damaged := home.remove_damaged(range(start, stop))):
+                    progress(Report(f"{len(damaged)} damaged shards are made again"))
                 done = {*home.done(range(start, stop))}
                 shards = [k for k in range(start, stop) if k not in done]
                 _run(home, shards, task, pool, progress)

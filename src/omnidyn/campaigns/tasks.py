@@ -29,7 +29,7 @@ from omnidyn.control.paths.path import path as path_named
 from omnidyn.errors import InputError
 from omnidyn.logs.command_file import KINDS, HeldCommands, read_commands
 from omnidyn.model.keys import Key, expand
-from omnidyn.model.known.told import holding
+from omnidyn.model.known.breakaway_levels import holding
 from omnidyn.model.known.uncertainty import Draws
 from omnidyn.model.motor import settled_current
 from omnidyn.model.robot import Robot

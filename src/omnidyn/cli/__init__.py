@@ -7,6 +7,8 @@ app has all commands. One file for each, or for those that belong together: init
 check, identify (its logs in identify_logs, what it writes in identify_show), compare, simulate, loops (`track`,
 `tune`), sweep, at_rest (`deadzone`), exchange (`import`, `export`), logs (`convert`), demo, warm, doctor. What they
 share: log_options, outcome (how a command ends), terminal/.
+demo_folder: the folder of the demo.
+identify_brief: the result on one screen.
 """
 
 from __future__ import annotations

@@ -34,6 +34,7 @@ def sweep(
     workers: int | None = typer.Option(None, min=1, help="Processes; default: as many as processors."),
     scheduler: str = typer.Option("", metavar="tcp://HOST:PORT", help="A Dask cluster that runs already."),
     shard: str = typer.Option("", metavar="I/N", help="Only the I-th of N parts, as in an array of Slurm."),
+    repair: bool = typer.Option(False, "--repair", help="Of resume: make shards that have changed again."),
     metric: str = typer.Option("", metavar="NAME", help="What shares, limit and picture are about."),
     limit: float | None = typer.Option(None, help="Of the metric: which share of the samples keeps it."),
     force: bool = typer.Option(False, "--force", help="Replace a picture or table that exists."),
@@ -43,14 +44,16 @@ def sweep(
 
     Whatever ends it, even the power, `omnidyn sweep resume FOLDER` goes on with what is missing.
     """
+    if repair and what != RESUME:
+        raise typer.BadParameter("--repair goes with resume FOLDER.")
     if what not in (STATUS, RESUME, MERGE, PLOT):
         if folder or not out:
             raise typer.BadParameter("a spec needs -o FOLDER; without a spec: status, resume, merge or plot FOLDER.")
-        return _run(what, out, workers, scheduler, shard, metric, limit, json)
+        return _run(what, out, workers, scheduler, shard, False, metric, limit, json)
     if not folder:
         raise typer.BadParameter(f"{what} needs a FOLDER.")
     if what == RESUME:
-        return _run("", folder, workers, scheduler, shard, metric, limit, json)
+        return _run("", folder, workers, scheduler, shard, repair, metric, limit, json)
     campaign = omnidyn.load_campaign(folder)
     if what == MERGE:
         _merge(campaign, out, force)
@@ -72,6 +75,7 @@ def _run(
     workers: int | None,
     scheduler: str,
     shard: str,
+    repair: bool,
     metric: str,
     limit: float | None,
     json: bool,
@@ -80,7 +84,13 @@ def _run(
     with shown_progress("reading the spec") as progress:
         progress(Report("starting"))
         campaign = omnidyn.sweep(
-            spec or None, folder, workers=workers, scheduler=scheduler, shard=part, progress=progress
+            spec or None,
+            folder,
+            workers=workers,
+            scheduler=scheduler,
+            shard=part,
+            repair=repair,
+            progress=progress,
         )
     say(f"omnidyn: shards are in {folder}; one file of them: omnidyn sweep merge {folder}")
     _tell(campaign, metric, limit, json)

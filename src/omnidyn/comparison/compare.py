@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.comparison.metrics import Metrics, ModelDifference, difference, metrics
+from omnidyn.comparison.errors_from_start import errors_for_whiteness
+from omnidyn.comparison.metrics import Metrics, metrics
+from omnidyn.comparison.model_bands import with_bands
+from omnidyn.comparison.nearer_model import ModelDifference, difference
 from omnidyn.comparison.replay import HOLD, Replay, choose_input, refuse_other_robot, replay
 from omnidyn.comparison.result import Comparison, Segment
-from omnidyn.comparison.traces import Trace, compared_components, counts_from_start, errors_for_whiteness, trace_of
+from omnidyn.comparison.traces import Trace, compared_components, counts_from_start, trace_of
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
 from omnidyn.model.first_guess import rests_on
-from omnidyn.model.known.told import told
-from omnidyn.model.known.uncertainty import DRAWS, plausible
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
-from omnidyn.simulation.band import Band, band_of, first_order_band
 from omnidyn.simulation.engine import TOLERANCE
 from omnidyn.statement import Statement
 
@@ -219,65 +218,3 @@ def _warnings(runs: Sequence[Run], replays: Mapping[str, Sequence[Replay]]) -> I
             logs.setdefault(warning, []).append(run.source or f"log {k + 1}")
     for warning, names in logs.items():
         yield warning if len(runs) == 1 else warning.of(*names)
-
-
-# Bands of a comparison: what of the distance between model and robot the std of the robot file may explain
-
-BAND_TOLERANCE = 1e-4  # [m/s] of the implicit engine: a band is a hundred times as wide, or of no interest
-
-
-def with_bands(
-    comparison: Comparison,
-    robots: Sequence[Robot],
-    *,
-    logs: Sequence[int] | None = None,
-    apply: str | None = None,
-    hold: float = HOLD,
-    tol: float | None = BAND_TOLERANCE,
-    draws: int = DRAWS,
-    seed: int = 0,
-    log: LogEffects | None = None,
-) -> Comparison:
-    """The comparison with the band of each model: the same free runs by plausible robots.
-
-    robots: those compared, in order. logs: which logs, all by default. apply, hold, tol, log: as they were compared. A
-    robot whose file has no std has no band, and a warning says so.
-    """
-    indices = range(len(comparison.measured)) if logs is None else logs
-    bands: dict[str, Mapping[int, Band]] = {}
-    warnings, guessed = [], {}
-    for name, robot in zip(comparison.robots, robots, strict=True):
-        uncertain = told(robot)
-        if not uncertain.keys:
-            warnings.append(Statement("no_band", subject=name))
-            continue
-        candidates = plausible(robot, draws, seed)
-        bands[name] = {
-            k: band_of(
-                candidates,
-                lambda candidate, k=k: (
-                    replay(candidate, comparison.measured[k], apply=apply, hold=hold, tol=tol, log=log).run
-                ),
-            )
-            for k in indices
-        }
-        guessed[name] = uncertain.guessed
-        if uncertain.guessed:
-            warnings.append(Statement("band_rests_on_guesses", subject=name, numbers={"guesses": uncertain.guessed}))
-    return replace(comparison, bands=bands, guesses=guessed, warnings=(*comparison.warnings, *warnings))
-
-
-def with_fitted_band(comparison: Comparison, robot: Robot, log: int = 0) -> Comparison:
-    """The comparison with the band of a robot that was fitted, in one of its logs: to first order.
-
-    That is what a fit knows of its numbers, and some of them it knows only together: see `first_order_std`. The runs
-    that slopes are taken from have one step a row, as those of the fit. No band where no number has a std.
-    """
-    (name,) = comparison.robots
-    if not told(robot).keys:
-        return comparison
-    run = comparison.simulated[name][log]
-    band = first_order_band(
-        robot, run, lambda candidate: replay(candidate, comparison.measured[log], tol=None, log=robot.log).run
-    )
-    return replace(comparison, bands={name: {log: band}})

@@ -21,8 +21,8 @@ from omnidyn.comparison.start import REST, start_of
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
 from omnidyn.logs.segments import segments
+from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.log_effects import LogEffects
-from omnidyn.model.motor import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import CHANNELS, WHEEL, Run
 from omnidyn.simulation.commands import Commands, commands

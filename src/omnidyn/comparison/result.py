@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.comparison.metrics import Metrics, ModelDifference
+from omnidyn.comparison.metrics import Metrics
+from omnidyn.comparison.nearer_model import ModelDifference
 from omnidyn.comparison.traces import Trace, trace_of, unit
 from omnidyn.comparison.verdict import compared, followed, nothing_followed
 from omnidyn.document import Document, Part, Table, Words, cell, chance_cell, plain

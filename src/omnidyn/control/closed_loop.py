@@ -20,8 +20,8 @@ from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
 from omnidyn.control.tracking import Tracking, Trackings
 from omnidyn.errors import InputError
+from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.log_effects import Sensors
-from omnidyn.model.motor import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run

@@ -38,7 +38,8 @@ from omnidyn.control.paths.adapter import as_path
 from omnidyn.control.pose_estimator import PoseEstimator, pose_estimator
 from omnidyn.control.pose_gate import JUMPED, REPEATED, SLIPPED, PoseGate
 from omnidyn.errors import INTERRUPTS, InputError, told_by
-from omnidyn.model.motor import DUTY, SPEED, no_load_speed
+from omnidyn.model.drive import DUTY, SPEED
+from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import per_wheel

@@ -20,10 +20,10 @@ from omnidyn.arrays import FloatArray, product
 from omnidyn.control.controller import WHEEL_SPEED, Guarded, output_limit
 from omnidyn.control.paths.motion import Path
 from omnidyn.errors import InputError
+from omnidyn.model.drive import Drive
 from omnidyn.model.dynamics import motor_wrench
 from omnidyn.model.inverse import Effort, Inverse, inverse
 from omnidyn.model.mass import per_mass
-from omnidyn.model.motor import Drive
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 

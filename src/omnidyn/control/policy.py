@@ -24,8 +24,8 @@ from omnidyn.control.controller import Guarded
 from omnidyn.control.feedforward import DT, check_dt
 from omnidyn.errors import InputError
 from omnidyn.files import read_bytes, write_atomic
+from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.frames import world_to_body
-from omnidyn.model.motor import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.environments.environments import TASKS
 from omnidyn.simulation.environments.layout import PATH, POSE, PREVIEW, columns_of

@@ -32,11 +32,11 @@ from omnidyn.control.paths.path import path as path_named
 from omnidyn.control.tracking import Tracking
 from omnidyn.document import Document, Part, Points, Table, all_of, plain
 from omnidyn.errors import InputError
+from omnidyn.model.drive import SPEED
 from omnidyn.model.inverse import inverse
 from omnidyn.model.known.told import told as known_errors
 from omnidyn.model.known.uncertainty import plausible
 from omnidyn.model.log_effects import Sensors
-from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.value import PerWheel
 from omnidyn.progress import Progress, Report, silent

@@ -16,11 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.errors import UnsupportedError
+from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.dynamics import is_decoupled, state_space
 from omnidyn.model.friction.direction import PLAIN
 from omnidyn.model.friction.kinds import COULOMB, KINDS
 from omnidyn.model.mass import of_body_alone, spin_couples
-from omnidyn.model.motor import DUTY, DYNAMIC, SPEED
+from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import levels_of
 

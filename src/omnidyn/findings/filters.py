@@ -16,7 +16,7 @@ from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.logs.channels import components, place
-from omnidyn.logs.resolved import rows_of_mean
+from omnidyn.logs.window_means import rows_of_mean
 from omnidyn.model.frames import unwrapped, world_to_body
 from omnidyn.statement import NOTE, WARNING
 from omnidyn.statistics import moving, robust_std

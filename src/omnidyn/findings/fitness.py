@@ -18,8 +18,8 @@ from omnidyn.logs.columns.mapping import ColumnMap, component_channel
 from omnidyn.logs.geometry import shows_both, wheel_geometry
 from omnidyn.logs.log import Log
 from omnidyn.logs.plateaus import MIN_DURATION, Plateau, first_plateaus
-from omnidyn.logs.segments import on_clock_of_wheels
-from omnidyn.model.motor import SPEED
+from omnidyn.logs.sensor_rows import on_clock_of_wheels
+from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement

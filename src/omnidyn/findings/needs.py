@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from omnidyn.model.actuation import asked_voltage
-from omnidyn.model.motor import DYNAMIC, SPEED
+from omnidyn.model.drive import SPEED
+from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.exact.exact_march import why_not_exact

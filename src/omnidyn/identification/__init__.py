@@ -8,4 +8,5 @@ selection/ says whether one more effect predicts held-out blocks better. Then st
 answers: lack_of_fit, stability), validation (free runs beside the logs), force_scale (what no log can correct),
 friction_curve (force against speed), ladder (its steps as values), advice (what to do next), and fit_document (all of
 it as tables and words). first_runs makes whatever the compiler is needed for.
+fingerprints: whether two logs are one recording.
 """

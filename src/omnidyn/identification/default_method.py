@@ -18,7 +18,7 @@ from omnidyn.identification.methods import (
     SteadyState,
 )
 from omnidyn.identification.steady.operating_points import why_no_transient
-from omnidyn.model.motor import DUTY, SPEED, VOLTAGE
+from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
 from omnidyn.model.robot import MEASURED, Prior, Robot
 from omnidyn.progress import Progress, Report
 from omnidyn.run import Run

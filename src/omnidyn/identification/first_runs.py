@@ -15,11 +15,12 @@ from omnidyn.compiled.parallel import compiled_elsewhere
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.engines.engine import row_squares, row_terms
+from omnidyn.identification.output_error.engines.row_sums import row_squares, row_terms
 from omnidyn.identification.output_error.memory.autoregression import autoregression
+from omnidyn.model.drive import SPEED
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.friction import WheelFriction
-from omnidyn.model.motor import DYNAMIC, SPEED
+from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run

@@ -78,7 +78,7 @@ def _is_level(name: str) -> bool:
 
 def _slope(robot: Robot, name: str, axis: int, speed: FloatArray) -> FloatArray:
     """Derivative of the force by a level, from both sides; a list that is one number, as of a disc, moves as one."""
-    upper_force, lower_force = (sliding_force(_moved(robot, name, way * STEP), axis, speed) for way in (1.0, -1.0))
+    upper_force, lower_force = (sliding_force(_moved(robot, name, side * STEP), axis, speed) for side in (1.0, -1.0))
     return (upper_force - lower_force) / (2.0 * STEP)
 
 

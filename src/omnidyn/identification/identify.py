@@ -16,7 +16,8 @@ from omnidyn.findings.fitness import STEADY as STEADY_USE
 from omnidyn.identification.advice import advice
 from omnidyn.identification.default_method import as_driven, default_method, why_not_output_error
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.grouping import fingerprint, held_out, names_of_groups
+from omnidyn.identification.fingerprints import fingerprint
+from omnidyn.identification.grouping import held_out, names_of_groups
 from omnidyn.identification.identification import After, Identification
 from omnidyn.identification.log_verdicts import judged_by_fit, log_verdicts, told_why, verdict_advice
 from omnidyn.identification.methods import (
@@ -45,7 +46,7 @@ from omnidyn.identification.whole_logs import solved
 from omnidyn.logs.log import Log
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.logs.steady_table import SteadyTable
-from omnidyn.model.motor import SPEED
+from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list

@@ -15,8 +15,9 @@ import numpy as np
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.comparison.compare import compare
+from omnidyn.comparison.errors_from_start import PATH, errors_for_whiteness
 from omnidyn.comparison.result import Comparison
-from omnidyn.comparison.traces import PATH, counts_from_start, errors_for_whiteness, unit
+from omnidyn.comparison.traces import counts_from_start, unit
 from omnidyn.comparison.verdict import is_missed
 from omnidyn.document import Document, Points, Table, cell, chance_cell
 from omnidyn.identification.lack_of_fit import LackOfFit

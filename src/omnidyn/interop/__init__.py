@@ -3,6 +3,8 @@
 dataframe: pandas and polars, of a Run, an Estimate, a Comparison. dataset: xarray. runs: a Run from any of these.
 systems: python-control. gymnasium: environments. kinds: which files of other tools are read as a robot; robot_json,
 urdf, mjcf: how; parts: a robot from masses and axles.
+mjcf_parts: what is read of a MuJoCo model.
+dataset: a Run as an xarray Dataset.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ _HOME = {
     "nonlinear_system": "omnidyn.interop.systems",
     "run_of": "omnidyn.interop.runs",
     "to_dataframe": "omnidyn.interop.dataframe",
-    "to_xarray": "omnidyn.interop.runs",
+    "to_xarray": "omnidyn.interop.dataset",
 }
 
 __all__ = [*_HOME]  # pyright: ignore[reportUnsupportedDunderAll]

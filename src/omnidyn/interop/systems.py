@@ -39,8 +39,8 @@ def nonlinear_system(robot: Robot) -> Any:
 
     def update(t: float, x: np.ndarray, u: np.ndarray, parameters: object) -> np.ndarray:
         volts = reaching(robot, clip_voltage(robot.motor, np.asarray(u, dtype=float)[:count]))
-        way = body_to_world(x[5]) @ x[:3]
-        return np.concatenate([acceleration(robot, x[:3], volts), way])
+        velocity = body_to_world(x[5]) @ x[:3]
+        return np.concatenate([acceleration(robot, x[:3], volts), velocity])
 
     names = [*STATES, *POSES]
     return control.nlsys(

@@ -249,9 +249,9 @@ def _rows(twist: FloatArray, speed: FloatArray, of_wheels: bool) -> FloatArray:
     if of_wheels and speed.shape[1] >= twist.shape[1]:
         *_, together = np.linalg.svd(speed, full_matrices=False)
         together = together[: twist.shape[1]]
-        way, *_ = np.linalg.lstsq(speed @ together.T, twist, rcond=None)
-        if np.linalg.cond(way) < 1.0 / np.finfo(float).eps:
-            return np.asarray(np.linalg.inv(way) @ together, dtype=float)
+        travel, *_ = np.linalg.lstsq(speed @ together.T, twist, rcond=None)
+        if np.linalg.cond(travel) < 1.0 / np.finfo(float).eps:
+            return np.asarray(np.linalg.inv(travel) @ together, dtype=float)
     return np.asarray(np.linalg.lstsq(twist, speed, rcond=None)[0], dtype=float)
 
 
@@ -276,7 +276,7 @@ def mean_speeds(run: Run, body: str, wheels: str, window: float = WINDOWS[0]) ->
     first, last = max(t[0] for t, _ in tracks), min(t[-1] for t, _ in tracks)
     half = AT_EDGE * longest
     edges = np.arange(first + half, last - half, longest)
-    ways = np.column_stack([_between(t, way, edges, half) for t, way in tracks]) / longest
+    ways = np.column_stack([_between(t, travel, edges, half) for t, travel in tracks]) / longest
     ways = ways[np.isfinite(ways).all(axis=1)]
     return ways[:, :3], ways[:, 3:]
 
@@ -311,16 +311,16 @@ def _body_tracks(run: Run, body: str) -> list[Track]:
     heading = unwrapped(pose[:, 2])
     turn, middle = np.diff(heading), 0.5 * (heading[1:] + heading[:-1])
     steps = np.diff(pose[:, 0] + 1j * pose[:, 1]) * np.exp(-1j * middle) / np.sinc(turn / (2.0 * np.pi))
-    way = np.append(0.0, np.cumsum(steps))
-    return [(t, np.real(way)), (t, np.imag(way)), (t, heading)]
+    travel = np.append(0.0, np.cumsum(steps))
+    return [(t, np.real(travel)), (t, np.imag(travel)), (t, heading)]
 
 
-def _between(t: FloatArray, way: FloatArray, edges: FloatArray, half: float) -> FloatArray:
+def _between(t: FloatArray, travel: FloatArray, edges: FloatArray, half: float) -> FloatArray:
     """How far a component went from each edge to the next, shape (edges - 1,); NaN across a gap of its samples.
 
     Where it was at an edge is a mean over `half` [s] before and behind it, the same for body and wheels.
     """
-    distances = np.diff(_integral(t, way, edges + half) - _integral(t, way, edges - half)) / (2.0 * half)
+    distances = np.diff(_integral(t, travel, edges + half) - _integral(t, travel, edges - half)) / (2.0 * half)
     gaps = np.append(0, np.cumsum(np.diff(t) > GAP * usual_step(t)))
     after = np.clip(np.searchsorted(t, edges[1:] + half), 0, len(t) - 1)
     before = np.clip(np.searchsorted(t, edges[:-1] - half, side="right") - 1, 0, len(t) - 1)

@@ -16,7 +16,8 @@ from omnidyn.errors import InputError, printable
 from omnidyn.files import default_max_bytes
 from omnidyn.logs.channels import TIME
 from omnidyn.logs.clock.clock import Clock
-from omnidyn.logs.clock.stamps import timed, with_joined_stamp
+from omnidyn.logs.clock.row_rate import timed
+from omnidyn.logs.clock.stamps import with_joined_stamp
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.read_log import LogOptions, map_columns
 from omnidyn.logs.readers.read_table import iter_tables, reader_of

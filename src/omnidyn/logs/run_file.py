@@ -10,7 +10,6 @@ Source and warnings of a Run are not in the file.
 
 from __future__ import annotations
 
-import io
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -25,6 +24,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
 from omnidyn.logs.channels import components, si_suffix
+from omnidyn.logs.mat_file import columns_to_mat
 from omnidyn.logs.mcap_run import import_mcap, run_to_mcap
 from omnidyn.logs.readers.parquet import SUFFIXES, import_pyarrow, parquet_bytes
 from omnidyn.logs.readers.read_table import READERS, read_table
@@ -268,18 +268,3 @@ def _wheel_count(names: Sequence[str]) -> int:
     """The highest number of a wheel in the names of the columns; no more than there are columns."""
     numbered = (re.fullmatch(r"[udiaw](\d{1,4})_\w+", name, re.ASCII) for name in names)
     return min(max((int(match[1]) for match in numbered if match), default=0), len(names))
-
-
-# A Run as a MATLAB file (version 5, which every MATLAB and Octave opens): each column of a run file is a variable
-
-HEAD, HEAD_SIZE = b"MATLAB 5.0 MAT-file, written by omnidyn", 116  # words for people, by the format
-
-
-def columns_to_mat(columns: Mapping[str, FloatArray]) -> bytes:
-    """Columns as variables of n rows, NaN where missing, to the last bit."""
-    from scipy.io import savemat
-
-    sink = io.BytesIO()
-    savemat(sink, {name: np.ascontiguousarray(values)[:, None] for name, values in columns.items()})
-    content = sink.getvalue()
-    return HEAD.ljust(HEAD_SIZE) + content[HEAD_SIZE:]  # SciPy writes the time of day there

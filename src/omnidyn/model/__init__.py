@@ -6,4 +6,8 @@ presets/, first_guess (a robot from a few numbers), actuation (what reaches its 
 beside its numbers). Then its mechanics: mass, frames, dynamics, inverse (voltages for a motion), sliding (all friction
 in one formula), deadzone; layout names the numbers that stick_slip/ works in, the inclusion that sticks exactly. Last
 what is known of its numbers, known/, and robots under other loads and on other floors, vary.
+correlation: the table [correlation].
+drive: what commands the motors.
+robot_table: the numbers of a robot as a table.
+variations: loads, floors, slopes, batteries by name.
 """

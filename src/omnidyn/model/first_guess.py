@@ -19,9 +19,10 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.model.drive import SPEED, Drive
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import EMF, FRICTION, GAINS, ROTOR, TORQUE, VISCOUS, Key, all_keys, find_key, name_of
-from omnidyn.model.motor import SPEED, Drive, Motor
+from omnidyn.model.motor import Motor
 from omnidyn.model.robot import GIVEN, GUESS, GUESSES, IMPORTED, MEASURED, Body, Origin, Prior, Robot
 from omnidyn.model.surroundings import GRAVITY as GRAVITY
 from omnidyn.model.wheels import PerWheel, Wheels

@@ -60,8 +60,10 @@ class Inverse:
         rising = np.where(rests, np.sign(about), 0.0)
         stands = np.all(twist[..., :2] == 0.0, axis=-1, keepdims=True)
         faint = np.abs(acceleration[..., :2]) <= slight * fastest
-        way = np.where(stands & ~faint, acceleration[..., :2], still)
-        return coulomb + resisting(levels, 0.0 * twist, 0.0 * speed, rising, levels.hold, way, levels.ellipse_hold)
+        direction = np.where(stands & ~faint, acceleration[..., :2], still)
+        return coulomb + resisting(
+            levels, 0.0 * twist, 0.0 * speed, rising, levels.hold, direction, levels.ellipse_hold
+        )
 
     def soft_friction(self, twist: FloatArray, fade: FloatArray) -> FloatArray:
         """Wrench of friction at a twist (*batch, 3), its dry part in proportion to the speed below `fade`, shape (3,).

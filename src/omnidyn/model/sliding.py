@@ -47,8 +47,8 @@ class FrictionLevels(NamedTuple):
         slide = np.stack([low + (high - low) * falling for low, high in zip(self.slide, self.hold, strict=True)])
         if falls[-1] == 0.0:
             return slide, self.ellipse_slide
-        way = fallen(np.hypot(twist[..., 0], twist[..., 1]), falls[-1], exponent[-1], shape[-1])[..., None]
-        return slide, self.ellipse_slide + (self.ellipse_hold - self.ellipse_slide) * way
+        direction = fallen(np.hypot(twist[..., 0], twist[..., 1]), falls[-1], exponent[-1], shape[-1])[..., None]
+        return slide, self.ellipse_slide + (self.ellipse_hold - self.ellipse_slide) * direction
 
 
 def levels_of(robot: Robot) -> FrictionLevels:
@@ -98,21 +98,21 @@ def resisting(
     speed: FloatArray,
     side: FloatArray,
     slide: FloatArray,
-    way: FloatArray,
+    direction: FloatArray,
     ellipse: FloatArray,
     least_dissipation: float = 0.0,
 ) -> FloatArray:
     """The formula of `sliding_wrench`, of elements that move, or are about to, to a side. Shape (*batch, 3).
 
     side: sgn s_e of each element, or a part of it, shape (*batch, 3 + wheels); slide: levels against either side,
-    shape (2, ..). way: in which the ellipse slides, shape (*batch, 2), and its levels, shape (2,) or (*batch, 2);
+    shape (2, ..). direction: in which the ellipse slides, shape (*batch, 2), and its levels, shape (2,) or (*batch, 2);
     least: what counts as its dissipation [N m/s], or of a plain one its speed [m/s], where it moves more slowly.
     """
     coulomb = np.where(side > 0.0, slide[0], slide[1])
     wrench = -(levels.viscous * speed + coulomb * side) @ levels.directions
-    size = np.sqrt(np.sum(((1.0 if levels.plain else ellipse) * way) ** 2, axis=-1, keepdims=True))
+    size = np.sqrt(np.sum(((1.0 if levels.plain else ellipse) * direction) ** 2, axis=-1, keepdims=True))
     size = np.maximum(size, least_dissipation)
-    wrench[..., :2] -= (ellipse if levels.plain else ellipse**2) * way / np.where(size > 0.0, size, 1.0)
+    wrench[..., :2] -= (ellipse if levels.plain else ellipse**2) * direction / np.where(size > 0.0, size, 1.0)
     return wrench
 
 

@@ -14,11 +14,12 @@ import numpy as np
 
 from omnidyn.arguments import check_order
 from omnidyn.errors import InputError
+from omnidyn.model.correlation import KeyCorrelation, key_correlation
 from omnidyn.model.friction import Friction
 from omnidyn.model.keys import BREAKAWAY, COULOMB, VISCOUS
-from omnidyn.model.log_effects import KeyCorrelation, key_correlation
 from omnidyn.model.robot import Prior, Robot
-from omnidyn.model.surroundings import KINDS, Battery, Floor, Payload, Surface
+from omnidyn.model.surroundings import Floor
+from omnidyn.model.variations import KINDS, Battery, Payload, Surface
 
 LEVELS = (VISCOUS, COULOMB, BREAKAWAY)
 ON_FLOOR = ("axes", "direction")  # the parts of friction that a floor has; that at the wheels is of bearings and gears

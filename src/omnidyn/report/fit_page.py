@@ -3,30 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from omnidyn.comparison.compare import with_fitted_band
+from omnidyn.comparison.model_bands import with_fitted_band
 from omnidyn.comparison.result import Comparison
 from omnidyn.document import Points, sentence
 from omnidyn.identification.fit_document import difference_table, number_table, short_table, verdict_table
 from omnidyn.identification.identification import Identification
-from omnidyn.identification.lack_of_fit import Binned
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.validation import FITTED, HELD_OUT, Score, Validation, output_name
 from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.logs.path import BodyPath, body_twist, driven, path_of
-from omnidyn.report.figures.dead_zone_map import dead_zone_section
+from omnidyn.report.figures.correlations import draw_correlation
+from omnidyn.report.figures.dead_zone_section import dead_zone_section
 from omnidyn.report.figures.friction_speed import draw_estimates
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
-from omnidyn.report.figures.residuals import draw_correlation, draw_residuals, residuals_of
+from omnidyn.report.figures.residuals import draw_residuals, residuals_of
 from omnidyn.report.html import Section, beside, bullets, content, figure, page, paragraph, section
-from omnidyn.report.style import BLUE, GREY, WIDTH, Picture, look, new_figure, picture, thin_out
+from omnidyn.report.misfit_section import draw_misfit
+from omnidyn.report.style import Picture
 from omnidyn.run import Run
 
 Fits = Mapping[str, OutputErrorEstimate]
@@ -253,31 +254,3 @@ def _warnings(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
         for comparison in (validation.fitted, validation.held_out):
             words += map(str, comparison.warnings) if comparison is not None else ()
     return words
-
-
-# What the model leaves out: residuals in bins, against speed, acceleration, time and heading
-
-HEIGHT = 4.6  # inch
-
-
-def draw_misfit(pictures: Sequence[Binned], name: str = "misfit") -> Picture:
-    """A panel for each of what the residuals of one output may follow. Noise alone stays within the bars at 0."""
-    with look():
-        figure = new_figure(WIDTH, HEIGHT)
-        figure.subplots(2, 2, squeeze=False, sharey=True)
-        figure.subplots_adjust(left=0.11, right=0.975, top=0.95, bottom=0.12, hspace=0.42, wspace=0.1)
-        for panel, binned in zip(figure.axes, pictures, strict=False):
-            panel.axhline(0.0, color=GREY, linewidth=0.8)
-            panel.errorbar(binned.at, binned.mean, binned.error, color=BLUE, marker="o", markersize=4.0, linewidth=1.2)
-            panel.set_xlabel(binned.against)
-            thin_out(panel, y=4)
-        for panel in figure.axes[len(pictures) :]:
-            panel.set_visible(False)
-        first = pictures[0]
-        figure.supylabel(f"residual of {first.output} [{first.unit}]", fontsize=11.0)
-        caption = (
-            f"Mean residual of {first.output}, the output that holds most that is no noise, with two standard errors "
-            "(as of white noise). A model that is right leaves points about 0 in every panel; a curve is what it "
-            "leaves out."
-        )
-        return picture(name, f"What the model leaves out of {first.output}", caption, figure)

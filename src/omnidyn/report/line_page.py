@@ -8,7 +8,7 @@ from typing import Any
 from omnidyn.document import Points
 from omnidyn.identification.fit_document import verdict_table
 from omnidyn.identification.identification import Identification
-from omnidyn.report.figures.dead_zone_map import dead_zone_section
+from omnidyn.report.figures.dead_zone_section import dead_zone_section
 from omnidyn.report.figures.friction_speed import draw_estimates
 from omnidyn.report.html import Section, content, page, paragraph, section
 

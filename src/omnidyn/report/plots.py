@@ -8,8 +8,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from omnidyn.campaigns.results import Campaign
-from omnidyn.comparison.compare import with_fitted_band
 from omnidyn.comparison.drift import Drift
+from omnidyn.comparison.model_bands import with_fitted_band
 from omnidyn.comparison.result import Comparison
 from omnidyn.control.tracking import Tracking, Trackings
 from omnidyn.errors import InputError

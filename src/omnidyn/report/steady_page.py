@@ -12,7 +12,7 @@ from omnidyn.identification.steady.operating_points import FORCES, SPEEDS
 from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.identification.verdict import steady_verdict
 from omnidyn.logs.path import driven
-from omnidyn.report.figures.dead_zone_map import dead_zone_section
+from omnidyn.report.figures.dead_zone_section import dead_zone_section
 from omnidyn.report.figures.friction_speed import draw_estimates
 from omnidyn.report.figures.shapes import shape_pictures
 from omnidyn.report.html import page, section

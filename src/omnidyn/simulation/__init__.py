@@ -6,4 +6,6 @@ the paper's law, coulomb/ for friction of constant levels, slip/ for wheels that
 travel: what is kept of the turn and travel of a run. batch/ moves many robots at once. sensitivity/ gives the
 derivatives of a run, band how far it may be off. environments/ for learning; friction_study: what the friction of a
 robot does.
+grip: which wheels lost their grip.
+delays: commands and channels that are late.
 """

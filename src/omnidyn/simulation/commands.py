@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.actuation import clip_voltage, voltage_of_duty
-from omnidyn.model.motor import SPEED
+from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.statement import WARNING, Statement

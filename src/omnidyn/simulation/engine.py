@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, UnsupportedError
@@ -21,12 +21,13 @@ from omnidyn.simulation.contract import Conditions, Engine, Motion
 from omnidyn.simulation.coulomb.door import moved, run, run_looped
 from omnidyn.simulation.exact.exact_march import ExactMarch, why_not_exact
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
+from omnidyn.simulation.grip import Grip, not_converged
 from omnidyn.simulation.implicit.implicit_march import Outcome, capped, march_workspace, run_implicit
-from omnidyn.simulation.slip.plant import slip_plant, wheel_loads
-from omnidyn.simulation.slip.slip_march import SlipOutcome, rolling, run_slipping
+from omnidyn.simulation.slip.plant import slip_plant
+from omnidyn.simulation.slip.slip_march import rolling, run_slipping
 from omnidyn.simulation.speed_loop import LoopSettings, loop_of, no_loop
 from omnidyn.simulation.travel import PATH
-from omnidyn.statement import WARNING, Statement
+from omnidyn.statement import Statement
 
 TOLERANCE = 1e-6
 # Beyond these a step has no meaning and the implicit engine no end: [m/s, rad/s], [m, rad], [A].
@@ -391,55 +392,3 @@ def as_start(name: str, value: ArrayLike, size: int) -> FloatArray:
         expected = f"{size} numbers within -{LARGEST_START[name]:g} to {LARGEST_START[name]:g}, in SI units"
         raise InputError("no robot starts there", got=value, expected=expected, where=name)
     return array
-
-
-# Which wheels lost their grip in a run, and which have none
-
-
-class Grip(NamedTuple):
-    """What a run, or stretches of it one after the other, showed of the wheels of a robot.
-
-    rows, states: how many; capped: rows in which the solver hit its cap. spun: states in which a wheel slipped, lifted:
-    rows in which it would have to be held down, shape (wheels,).
-    """
-
-    rows: int
-    states: int
-    capped: int
-    spun: NDArray[np.intp]
-    lifted: NDArray[np.intp]
-
-    @classmethod
-    def none(cls, wheels: int) -> Grip:
-        """Before anything moved."""
-        return cls(0, 0, 0, np.zeros(wheels, int), np.zeros(wheels, int))
-
-    def with_run(self, out: SlipOutcome) -> Grip:
-        """After another stretch."""
-        first = 1 if self.states else 0  # where the one before ended
-        return Grip(
-            self.rows + len(out.contact) - 1,
-            self.states + len(out.contact) - first,
-            self.capped + out.capped,
-            self.spun + (out.contact[first:] != 0.0).sum(axis=0),
-            self.lifted + out.lifted.astype(int),
-        )
-
-    def statements(self, robot: Robot) -> tuple[Statement, ...]:
-        """What is to be said of the wheels, and of the solver."""
-        shares, rows = self.spun / max(self.states, 1), max(self.rows, 1)
-        wheels = np.flatnonzero(shares)
-        slip = Statement("wheels_slip", WARNING, numbers={"wheels": wheels + 1, "shares": shares[wheels]})
-        lifted = [
-            Statement("wheel_lifts", WARNING, numbers={"wheel": w + 1, "share": count / rows})
-            for w, count in enumerate(self.lifted.tolist())
-            if count
-        ]
-        air = [Statement("wheel_in_air", WARNING, numbers={"wheel": w + 1}) for w in wheel_loads(robot).lifted]
-        capped = [not_converged(self.capped, rows)] if self.capped else []
-        return (*air, *([slip] if wheels.size else []), *capped, *lifted)
-
-
-def not_converged(capped_rows: int, rows: int) -> Statement:
-    """That the friction solver hit its cap in some rows of a run."""
-    return Statement("not_converged", WARNING, numbers={"stopped": capped_rows, "rows": rows})

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.actuation import clip_voltage, reaching
-from omnidyn.model.motor import DUTY, SPEED
+from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.commands import Commands

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from omnidyn.document import all_of
+from omnidyn.model.drive import DUTY, VOLTAGE
 from omnidyn.model.keys import in_words
-from omnidyn.model.motor import DUTY, VOLTAGE
 from omnidyn.statement import Statement
 from omnidyn.telling.sentence import Sentence
 

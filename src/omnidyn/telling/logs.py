@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from omnidyn.document import all_of
-from omnidyn.logs.columns.guessed import Doubt
+from omnidyn.logs.columns.doubts import Doubt
 from omnidyn.statement import Statement
 from omnidyn.telling.sentence import Sentence, by_number, either
 

@@ -12,8 +12,8 @@ from omnidyn.control.paths.motion import Path, Reference
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.code.c_controller import c_controller
 from omnidyn.export.features import CONTROLLERS, REFUSES, Cell
+from omnidyn.model.drive import Drive
 from omnidyn.model.log_effects import Lateness, LogEffects, Sensors
-from omnidyn.model.motor import Drive
 from tests.support.controlled import CController
 from tests.support.exported import STRICT, exact_robot
 from tests.support.mixed_robots import random_robot, with_centre, with_spin

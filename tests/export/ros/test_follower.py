@@ -12,7 +12,7 @@ import omnidyn
 from omnidyn.control.controllers import controller_named
 from omnidyn.control.paths.path import path as path_of
 from omnidyn.export.ros.node import ros2_node
-from omnidyn.model.motor import Drive
+from omnidyn.model.drive import Drive
 from tests.export.ros.test_node import NO_NUMBERS, NO_SUPPLY, NO_TIME, ROBOT, Plant, loaded
 from tests.export.ros.test_node import bus as bus
 from tests.support.exported import STRICT

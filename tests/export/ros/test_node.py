@@ -13,7 +13,7 @@ import pytest
 import omnidyn
 from omnidyn.errors import InputError
 from omnidyn.export.ros.node import ros2_node
-from omnidyn.model.motor import Drive
+from omnidyn.model.drive import Drive
 from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
 from tests.export.ros.test_ros2_control import checked_package, installed, started
 from tests.support.exported import exact_robot

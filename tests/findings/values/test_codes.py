@@ -6,8 +6,8 @@ import pytest
 from omnidyn.findings.check import check
 from omnidyn.logs.column import Column
 from omnidyn.logs.columns.mapping import ColumnMap
-from omnidyn.logs.read_log import load_log
 from omnidyn.logs.log import Log
+from omnidyn.logs.read_log import load_log
 from omnidyn.simulation.simulate import simulate
 
 

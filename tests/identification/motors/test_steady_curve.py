@@ -13,8 +13,8 @@ from omnidyn.identification.motors.log import motor_logs
 from omnidyn.identification.motors.steady_curve import curves_of_logs, curves_of_points, steady_speed
 from omnidyn.identification.motors.study import motors_verdict, study_points
 from omnidyn.logs.motor_table import MotorTable
+from omnidyn.model.drive import Drive
 from omnidyn.model.friction import Friction
-from omnidyn.model.motor import Drive
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 

@@ -5,7 +5,7 @@ import pytest
 
 import omnidyn
 from omnidyn.errors import InputError
-from omnidyn.identification.output_error.problem.friction_laws import with_damping
+from omnidyn.identification.output_error.problem.bristles import with_damping
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot

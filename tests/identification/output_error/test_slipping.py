@@ -9,13 +9,14 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, SlipEngine
 from omnidyn.identification.output_error.linear.driven_motion import motions
-from omnidyn.identification.output_error.prepare import FINE_TOLERANCE, make_problem, motion, read_records
+from omnidyn.identification.output_error.moved_axes import motion
+from omnidyn.identification.output_error.prepare import FINE_TOLERANCE, make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.structure.missing import laws
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.surroundings import GRAVITY
-from omnidyn.report.figures.dead_zone_map import dead_zone_section
+from omnidyn.report.figures.dead_zone_section import dead_zone_section
 from omnidyn.run import Run
 from omnidyn.simulation.slip.plant import wheel_loads
 from tests.support.codes import codes

@@ -10,7 +10,7 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.linear.workbench import scaled
 from omnidyn.identification.output_error.problem.parameters import Parameter
-from omnidyn.identification.output_error.trust.support import at_the_end
+from omnidyn.identification.output_error.trust.search_ends import at_the_end
 from omnidyn.model.keys import Key, expand
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run

@@ -10,7 +10,7 @@ from benchmarks.wrong_worlds.score import drawn
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.linear.driven_motion import motions
-from omnidyn.identification.output_error.linear.sensitivity import losses, shown_by_losses
+from omnidyn.identification.output_error.linear.missing_inputs import losses, shown_by_losses
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run

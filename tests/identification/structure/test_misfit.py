@@ -15,7 +15,7 @@ from benchmarks.wrong_worlds.score import drawn
 from benchmarks.wrong_worlds.world import World
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.linear.rows import of_rounding
+from omnidyn.identification.output_error.linear.rounding_noise import of_rounding
 from omnidyn.identification.output_error.memory.autoregression import autoregression
 from omnidyn.identification.verdict import fits_verdict
 from omnidyn.model.robot_file import load_robot

@@ -8,7 +8,8 @@ from benchmarks.wrong_worlds.kinds import KINDS
 from benchmarks.wrong_worlds.log import COUNTS, SPEEDS, logged, right_case, robot_of
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.linear.sensitivity import beside_rounding, input_steps
+from omnidyn.identification.output_error.linear.input_steps import input_steps
+from omnidyn.identification.output_error.linear.rounded_inputs import beside_rounding
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run

@@ -3,7 +3,7 @@
 import pytest
 
 from omnidyn.logs.readers.read_table import read_table
-from omnidyn.logs.table.header import preamble
+from omnidyn.logs.table.preamble import preamble
 
 ROWS = "-0.1,6,4\n-0.09,6,3.5\n-0.08,5,3\n-0.07,5,2.5\n"
 

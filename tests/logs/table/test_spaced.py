@@ -8,7 +8,7 @@ import pytest
 from omnidyn.cli.identify_logs import STEADY_TABLE, table_kind
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import iter_tables, read_table
-from omnidyn.logs.readers.text import NOTE, cells, is_spaced, tabbed
+from omnidyn.logs.readers.spaced_text import NOTE, cells, is_spaced, tabbed
 
 VALUES = {"t": [0.0, 0.1, 0.2], "w1": [1.0, -2.5, 3e-3], "u": [0.0, 6.0, -6.0]}
 

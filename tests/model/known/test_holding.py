@@ -3,7 +3,7 @@
 import numpy as np
 
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.model.known.told import holding, slides_least
+from omnidyn.model.known.breakaway_levels import holding, slides_least
 from omnidyn.model.robot_file import load_robot
 
 AXEBOT = load_robot("axebot")

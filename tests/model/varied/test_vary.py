@@ -8,7 +8,8 @@ from omnidyn.errors import InputError
 from omnidyn.model.first_guess import guessed, rests_on, with_gear
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
-from omnidyn.model.surroundings import Battery, Floor, Payload, Surface
+from omnidyn.model.surroundings import Floor
+from omnidyn.model.variations import Battery, Payload, Surface
 from omnidyn.model.vary import vary_as
 
 TABLES = """

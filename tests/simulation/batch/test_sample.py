@@ -5,8 +5,8 @@ import pytest
 
 import omnidyn
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.model.correlation import key_correlation
 from omnidyn.model.known.uncertainty import plausible
-from omnidyn.model.log_effects import key_correlation
 from omnidyn.model.robot import Prior
 from omnidyn.simulation.batch.parameters import batch_parameters
 

@@ -28,7 +28,8 @@ from omnidyn.export.ros.package import package, package_name, read_me
 from omnidyn.export.ros.ros2_control import HEADROOM, limits
 from omnidyn.export.spelling import filled, number, python_comment
 from omnidyn.model.deadzone import HIGHEST, axis_patterns, breakaway_voltage
-from omnidyn.model.motor import SPEED, no_load_speed
+from omnidyn.model.drive import SPEED
+from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, twist_from_wheel_speed
 

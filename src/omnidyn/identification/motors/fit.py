@@ -50,7 +50,7 @@ from omnidyn.identification.output_error.conclusion import intervals
 from omnidyn.identification.output_error.problem.differences import added_up, differences
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
-from omnidyn.identification.output_error.trust.support import at_the_end
+from omnidyn.identification.output_error.trust.search_ends import at_the_end
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust, trust
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.model.layout import YAW

@@ -2,8 +2,8 @@
 
 The rows are cut into blocks of equal length. A fifth of them at a time has no outputs for a fit, and is predicted by
 its free run, which goes on through them under the input of the log. Of dead band, offset and latency the one is left
-out that held-out rows need least, as long as the blocks do not need it by more than chance (`compare_blocks`). A dead
-band or an offset whose interval reaches 0 is left out as well: the likelihood stands beside the blocks.
+out that held-out rows need least, as long as the blocks do not need it by more than chance (`compare_blocks`). One
+whose interval reaches 0 is left out as well: the likelihood stands beside the blocks.
 """
 
 from __future__ import annotations
@@ -268,8 +268,8 @@ def written_and_plain(logs: Sequence[MotorLog], motor: int, method: MotorFit) ->
 
 
 def _reaching_zero(fit: MotorEstimate, names: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """The dead band and the offset that a fit does not tell from 0, with their intervals: the first of them."""
-    ends = {name: fit.ci95[name] for name in (OFFSET, BAND) if name in names}
+    """The numbers of NUMBERS that a fit does not tell from 0, with their intervals: the first of them."""
+    ends = {name: _interval(fit, name) for name in reversed(NUMBERS) if name in names}
     return dict([item for item in ends.items() if item[1][0] <= 0.0 <= item[1][1]][:1])
 
 

@@ -35,9 +35,9 @@ from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, OFFSET, S
 from omnidyn.identification.motors.log import HEADING, LENGTH
 from omnidyn.identification.motors.steady_curve import map_of
 from omnidyn.identification.motors.study import MotorStudy
+from omnidyn.model.drive import SPEED
 from omnidyn.model.keys import EMF, TORQUE, Key, unit, with_priors
 from omnidyn.model.known.told import with_correlation
-from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Prior, Robot
 from omnidyn.model.wheels import per_wheel
 from omnidyn.statement import NOTE, WARNING, Statement

@@ -15,8 +15,9 @@ from omnidyn.clocks import usual_step
 from omnidyn.errors import InputError
 from omnidyn.findings.needs import MOTOR_INPUTS, motor_input, turns_known
 from omnidyn.logs.plateaus import STEPWISE, live_angle
-from omnidyn.logs.resolved import rows_of_mean
-from omnidyn.logs.segments import on_clock_of, segments
+from omnidyn.logs.segments import segments
+from omnidyn.logs.sensor_rows import on_clock_of
+from omnidyn.logs.window_means import rows_of_mean
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import SENSORS, Run

@@ -17,7 +17,8 @@ from omnidyn.identification.output_error.prepare import (
     read_records,
     stays_exact,
 )
-from omnidyn.identification.output_error.problem.friction_laws import with_damping, without_band
+from omnidyn.identification.output_error.problem.bristles import with_damping
+from omnidyn.identification.output_error.problem.karnopp import without_band
 from omnidyn.identification.output_error.problem.parameters import refuse_unknown
 from omnidyn.identification.output_error.trust.breakaway import asked_levels, refuse_level
 from omnidyn.model.keys import Key

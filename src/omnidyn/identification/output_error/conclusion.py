@@ -15,10 +15,9 @@ from omnidyn.comparison.verdict import is_missed
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified, printable
 from omnidyn.identification.force_scale import scale_of_motion
-from omnidyn.identification.methods import GAUSS, NU
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
-from omnidyn.identification.output_error.combinations import combinations, trades
-from omnidyn.identification.output_error.engines.engine import late_by
+from omnidyn.identification.output_error.combinations import combinations
+from omnidyn.identification.output_error.numbers_of_logs import key_of, latencies_like_zero, with_nuisances
 from omnidyn.identification.output_error.problem.friction_laws import coulomb_below, falls
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, TRAVELS, implausible
 from omnidyn.identification.output_error.problem.parameters import Parameter
@@ -26,18 +25,16 @@ from omnidyn.identification.output_error.problem.problem import Column, FitProbl
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.solve.steps import Order
+from omnidyn.identification.output_error.traded_numbers import trades
 from omnidyn.identification.output_error.trust.breakaway import Breakaway
 from omnidyn.identification.output_error.trust.cures import Blind, blind_directions
-from omnidyn.identification.output_error.trust.support import at_the_end, too_early
+from omnidyn.identification.output_error.trust.search_ends import at_the_end
+from omnidyn.identification.output_error.trust.support import too_early
 from omnidyn.identification.output_error.trust.uncertainty import Trust, from_the_log_alone, given
-from omnidyn.model import keys
-from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN
-from omnidyn.model.frames import AXES
-from omnidyn.model.keys import ROTOR, VISCOUS, WHEEL, Key, find_key, unit, with_priors
-from omnidyn.model.known.told import holding, with_correlation
-from omnidyn.model.log_effects import Lateness, LogEffects, log_mark
+from omnidyn.model.keys import ROTOR, VISCOUS, WHEEL, Key, unit, with_priors
+from omnidyn.model.known.breakaway_levels import holding
+from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import JOINT, WITH_THE_FIT, Prior, Robot
-from omnidyn.run import Run
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 from omnidyn.statistics import difference_noise
 
@@ -426,121 +423,3 @@ def _data(records: Sequence[Record]) -> str:
     rows = sum(last - first + 1 for r in records for first, last in r.pieces)
     first = records[0].source or "unnamed"
     return f"{first}, {rows} rows" if len(records) == 1 else f"{first} and {len(records) - 1} more logs, {rows} rows"
-
-
-# What was fitted beside the numbers of the robot file: what belongs to the robot goes into it, the rest to its logs
-#
-# The dead band of a driver is the robot's, and so is what all channels are late by together: to whatever commands the
-# robot it is one delay, wherever on the way it arises. A gain, a fade, a tilt, a push, and what one channel is later
-# than
-# another belong to the logs, and stand in the table [log] with the marks of these.
-
-LATENCY_ERRORS = 2.0  # standard errors within which a latency is like none
-
-
-def latencies_like_zero(problem: Problem, values: FloatArray, uncertainty: Trust) -> tuple[str, ...]:
-    """Names of latencies that 0 may stand for: within LATENCY_ERRORS standard errors of it were all else exact.
-
-    So the other numbers, which were found beside it, predict the same without it.
-    """
-    names = [p.name for p in problem.parameters]
-    spreads = np.diag(uncertainty.covariance)
-    known = np.flatnonzero(np.isfinite(spreads) & (spreads > 0.0))
-    size = np.sqrt(spreads[known])
-    precision = np.linalg.pinv(uncertainty.covariance[np.ix_(known, known)] / np.outer(size, size), hermitian=True)
-    alone = size / np.sqrt(np.maximum(np.diag(precision), 1.0))  # of each, all others exact
-    return tuple(
-        names[j]
-        for j, std in zip(known.tolist(), alone.tolist(), strict=True)
-        if problem.parameters[j].part == LATENCY and 0.0 < abs(values[j]) <= LATENCY_ERRORS * std
-    )
-
-
-def with_nuisances(
-    robot: Robot,
-    problem: Problem,
-    values: FloatArray,
-    std: Mapping[str, float],
-    open_names: Sequence[str],
-    records: Sequence[Record],
-    data: str,
-) -> Robot:
-    """The fitted robot with the dead band and the latency that were fitted beside it, and with what its logs did.
-
-    std: of the parameters by name; open_names: those that the data do not determine, which only go with the others.
-    """
-    angles = any(name == "wheel_angle" for name, _ in problem.columns)
-    if problem.robot_count == len(problem.parameters) and not angles and robot.log is None:
-        return robot
-    value_by_name = {p.name: float(v) for p, v in zip(problem.parameters, values, strict=True)}
-    seconds, slopes_of_latency = late_by(problem, values, problem.columns)
-    latency_by_channel = {name: second for (name, _), second in zip(problem.columns, seconds, strict=True)}
-    drive_latency = max(0.0, min(latency_by_channel.values(), default=robot.drive.latency))
-    change: dict[str, float] = {}
-    prior_by_key: dict[str, Prior] = {}
-    if DEAD_BAND in value_by_name:
-        change["dead_band"] = value_by_name[DEAD_BAND]
-        prior_by_key[keys.DEAD_BAND] = _known(DEAD_BAND, std, open_names, data)
-    if any(k >= 0 for k in slopes_of_latency):
-        change["latency"] = drive_latency
-        first = min(latency_by_channel, key=lambda name: latency_by_channel[name])
-        prior_by_key[keys.LATENCY] = _known(f"{LATENCY}.{first}", std, open_names, data)
-    drive = robot.drive.replace(**change) if change else robot.drive
-    priors = {name: prior for name, prior in robot.priors.items() if name not in prior_by_key}
-    prior_by_key = {
-        name: prior
-        for name, prior in prior_by_key.items()
-        if keys.Key.parse(name).get(robot.replace(drive=drive)) > 0.0
-    }
-    robot = robot.replace(
-        drive=drive, priors=priors, log=_effects(value_by_name, latency_by_channel, drive_latency, records)
-    )
-    return with_priors(robot, prior_by_key)
-
-
-def key_of(name: str, robot: Robot) -> str:
-    """Under which key a fitted number stands in the file of the robot, "" for one of the logs."""
-    if find_key(name) is not None:
-        return name
-    key = {DEAD_BAND: keys.DEAD_BAND}.get(name, "")
-    return key if key in robot.priors and robot.priors[key].std is not None else ""
-
-
-def _known(name: str, std: Mapping[str, float], open_names: Sequence[str], data: str) -> Prior:
-    if name not in std or name in open_names:
-        return Prior(source=printable(f"{WITH_THE_FIT}, {data}"), origin=JOINT)
-    return identified(std[name], f"output error, {data}")
-
-
-def _effects(
-    value_by_name: Mapping[str, float],
-    latency_by_channel: Mapping[str, float],
-    drive_latency: float,
-    records: Sequence[Record],
-) -> LogEffects | None:
-    """What the logs did; None where they did nothing."""
-    runs = [record.run for record in records if record.run is not None]
-    latency = Lateness(
-        **{name: other_latency for name, other_latency in latency_by_channel.items() if other_latency != drive_latency},
-        averaged=any(_added_up(run, latency_by_channel) for run in runs),
-    )
-    tilt, push = ([value_by_name.get(f"{kind}.{axis}", 0.0) for axis in AXES] for kind in (TILT, PUSH))
-    effects = LogEffects(
-        gain=value_by_name.get(GAIN, 1.0),
-        fade=value_by_name.get(FADE, 0.0),
-        latency=latency,
-        tilt=(tilt[0], tilt[1]),
-        push=(push[0], push[1], push[2]),
-    )
-    return None if effects == LogEffects() else effects.replace(of=tuple(log_mark(run) for run in runs))
-
-
-def _added_up(run: Run, latency_by_channel: Mapping[str, float]) -> bool:
-    """Whether wheel speeds of a run are those of counts: its angles, or what its speeds add up to, are fitted."""
-    one_of_both = (run.wheel_angle is None) != (run.wheel_speed is None)
-    return "wheel_angle" in latency_by_channel and one_of_both and len(run) > 1
-
-
-def loss_words(loss: str) -> str:
-    """A loss as an answer names it."""
-    return "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"

@@ -15,21 +15,23 @@ from functools import partial
 import numpy as np
 
 from omnidyn.errors import InsufficientDataError, UnsupportedError
-from omnidyn.identification.grouping import count_once
+from omnidyn.identification.fingerprints import count_once
 from omnidyn.identification.methods import AUTO, OutputError, degrees
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import ALL_LOGS, begun, group_names
-from omnidyn.identification.output_error.conclusion import conclude, loss_words, unexplained
+from omnidyn.identification.output_error.conclusion import conclude, unexplained
 from omnidyn.identification.output_error.joint import join, joint_start, own_names
 from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
-from omnidyn.identification.output_error.linear.sensitivity import beside_rounding, moved_by_the_file
+from omnidyn.identification.output_error.linear.rounded_inputs import beside_rounding
+from omnidyn.identification.output_error.linear.sensitivity import moved_by_the_file
 from omnidyn.identification.output_error.memory.whitening import Weighed, whitened, why_not
+from omnidyn.identification.output_error.numbers_of_logs import loss_words
 from omnidyn.identification.output_error.prepare import (
     FINE_TOLERANCE,
     Group,
     guesses,
 )
-from omnidyn.identification.output_error.problem.friction_laws import band_note, with_band
+from omnidyn.identification.output_error.problem.karnopp import band_note, with_band
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, TRAVELS, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated
 from omnidyn.identification.output_error.problem.problem import Problem
@@ -46,8 +48,9 @@ from omnidyn.identification.output_error.solve.solver import (
     Solver,
 )
 from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_levels, find_breakaway
+from omnidyn.identification.output_error.trust.group_differences import differences
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
-from omnidyn.identification.output_error.trust.resampling import beside, differences, refuse_bootstrap, resampled
+from omnidyn.identification.output_error.trust.resampling import beside, refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, too_early
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, Trust, trust
 from omnidyn.identification.output_error.written_fit import (
@@ -422,8 +425,9 @@ class Fit:
     @property
     def _settles(self) -> bool:
         """Whether nuisances are taken out again that the logs do not support."""
-        exact = all(group.engine.exact for group in self.groups)
-        return self.question.nuisances is None and (exact or len(self.groups) == 1)
+        return self.question.nuisances is None and (
+            len(self.groups) == 1 or all(group.engine.exact for group in self.groups)
+        )
 
     def _solve_joint(self, nuisances: Sequence[str] | None, progress: FitProgress) -> Solution:
         """The best point of all groups together."""
@@ -475,12 +479,11 @@ class Fit:
 
     def with_levels(self, solution: Solution, progress: FitProgress | None = None) -> tuple[Solution, list[Breakaway]]:
         """Breakaway that was asked for, and the fit with it."""
-        group = self.groups[0]
-        level_keys = asked_levels(group.robot, self.question.free or (), self.question.fixed)
-        names = [name for name in level_keys if group.tells(name)]
+        group, question = self.groups[0], self.question
+        names = [n for n in asked_levels(group.robot, question.free or (), question.fixed) if group.tells(n)]
         if not names:
             return solution, []
-        kind = self.question.covariance
+        kind = question.covariance
         uncertainty = trust(solution.solver, solution, SANDWICH if kind == AUTOREGRESSIVE else kind)
         return find_breakaway(solution, names, uncertainty, progress)
 

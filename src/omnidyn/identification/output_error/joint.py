@@ -76,12 +76,14 @@ class Member:
             plain_covariance=uncertainty.plain_covariance[np.ix_(indices, indices)],
             guessed_parameters=uncertainty.guessed_parameters[indices],
             directions=tuple(
-                (v, way[indices]) for v, way in uncertainty.directions if np.abs(way[indices]).max() > SHARE
+                (v, direction[indices])
+                for v, direction in uncertainty.directions
+                if np.abs(direction[indices]).max() > SHARE
             ),
             ways=tuple(
-                replace(way, step=way.step[indices], size=way.size[indices])
-                for way in uncertainty.ways
-                if way.step[indices].any()
+                replace(direction, step=direction.step[indices], size=direction.size[indices])
+                for direction in uncertainty.ways
+                if direction.step[indices].any()
             ),
         )
 

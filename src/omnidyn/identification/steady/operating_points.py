@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.needs import CURRENT, VOLTAGE, force_origin
-from omnidyn.identification.grouping import count_once
+from omnidyn.identification.fingerprints import count_once
 from omnidyn.identification.steady.points import refuse_losses
 from omnidyn.logs.plateaus import ANGLE, COMMANDS, SAME_COMMAND, Plateau, find_plateaus, held_pieces, live_angle, pool
-from omnidyn.logs.segments import on_clock_of_wheels
+from omnidyn.logs.sensor_rows import on_clock_of_wheels
 from omnidyn.model.actuation import asked_voltage, reaching
 from omnidyn.model.dynamics import frame_wrench, state_space
 from omnidyn.model.mass import mass_matrix

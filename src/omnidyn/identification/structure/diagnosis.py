@@ -13,12 +13,13 @@ from omnidyn.compiled.parallel import small_matrices
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.linear.driven_motion import motions
+from omnidyn.identification.output_error.linear.rounded_inputs import effects, with_rounding
 from omnidyn.identification.output_error.linear.rows import FitRows, Linear, solved
-from omnidyn.identification.output_error.linear.sensitivity import effects, with_rounding
 from omnidyn.identification.output_error.linear.workbench import Workbench, scaled
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.problem.bristles import bending_keys
 from omnidyn.identification.output_error.problem.decimated import Decimated
-from omnidyn.identification.output_error.problem.friction_laws import bending_keys, falls
+from omnidyn.identification.output_error.problem.friction_laws import falls
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
@@ -31,7 +32,7 @@ from omnidyn.identification.structure.noise_level import binned, noise_levels
 from omnidyn.identification.structure.shifts import stability
 from omnidyn.identification.structure.tails import as_counted, calmer, wild_samples
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
-from omnidyn.model.known.told import holding
+from omnidyn.model.known.breakaway_levels import holding
 
 SLOW_DEGREES = 2.0  # degrees of freedom with which the power of the slowest errors is known within its own size
 SHOWN_COLUMNS = 400  # columns: about what themes and candidates show

@@ -19,7 +19,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import time_of_row
 from omnidyn.identification.lack_of_fit import LOSS, Remedy, Wild
 from omnidyn.identification.methods import NU
-from omnidyn.identification.output_error.engines.engine import row_terms
+from omnidyn.identification.output_error.engines.row_sums import row_terms
 from omnidyn.identification.output_error.linear.blocks import BlockProducts
 from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion
 from omnidyn.identification.output_error.linear.rows import solved

@@ -9,7 +9,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.interop.gymnasium.vector import RobotVectorEnv
-from omnidyn.model.motor import DUTY
+from omnidyn.model.drive import DUTY
 from omnidyn.run import Run
 from omnidyn.simulation.environments.pool import largest_voltage
 

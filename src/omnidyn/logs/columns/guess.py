@@ -22,14 +22,17 @@ from omnidyn.logs.columns.component import (
     component_of_parts,
     numbered_kind,
 )
+from omnidyn.logs.columns.doubts import Doubt, doubt, joined_doubts, letter_of
 from omnidyn.logs.columns.frame_of import FRAMES
+from omnidyn.logs.columns.guess_side import settle_side, take_sides
 from omnidyn.logs.columns.guess_time import take_time
-from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, settle_side, take_sides, unit_of, voltage_limit
-from omnidyn.logs.columns.guessed import Doubt, Guess, doubt, first_word, floats, is_numeric, joined_doubts, letter_of
+from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, unit_of, voltage_limit
+from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import AGAIN, BRACKETS, read_name
 from omnidyn.logs.columns.plausible import beyond_range
-from omnidyn.logs.columns.wheel_numbers import BY_PLACES, proposed_wheels, wheel_numbers
+from omnidyn.logs.columns.wheel_numbers import BY_PLACES, wheel_numbers
+from omnidyn.logs.columns.wheels_by_motion import proposed_wheels
 from omnidyn.logs.table.table import FileTable
 from omnidyn.model.robot import Robot
 from omnidyn.statement import ERROR, WARNING, Statement

@@ -14,7 +14,8 @@ from omnidyn.logs.channels import TIME
 from omnidyn.logs.clock.clock import are_steps, is_dates
 from omnidyn.logs.column import Column
 from omnidyn.logs.columns import names as words
-from omnidyn.logs.columns.guessed import UNIT, Guess, doubt, first_word, floats, is_numeric
+from omnidyn.logs.columns.doubts import UNIT, doubt
+from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.table.table import FileTable
@@ -141,8 +142,8 @@ def _of_motion(table: FileTable, times: FloatArray, possible: list[Unit], guess:
     for speeds, places in _pairs(guess):
         moved, expected = 0.0, 0.0
         for speed, position in zip(speeds, places, strict=True):
-            rate, way = (floats(table.columns[column.name]) * column.factor for column in (speed, position))
-            pair = np.array([np.abs(np.diff(way)), np.abs(rate[1:] + rate[:-1]) / 2.0 * steps])
+            rate, place = (floats(table.columns[column.name]) * column.factor for column in (speed, position))
+            pair = np.array([np.abs(np.diff(place)), np.abs(rate[1:] + rate[:-1]) / 2.0 * steps])
             moved, expected = np.array([moved, expected]) + pair[:, np.isfinite(pair).all(axis=0)].sum(axis=1)
         if not (moved > 0.0 and expected > 0.0):
             continue

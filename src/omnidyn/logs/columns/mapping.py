@@ -13,7 +13,7 @@ from omnidyn.errors import InputError
 from omnidyn.files import MAX_TOML_BYTES, parse_toml, read_text, write_atomic
 from omnidyn.logs.channels import TIME, place, si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
-from omnidyn.logs.columns.guessed import Doubt
+from omnidyn.logs.columns.doubts import Doubt
 from omnidyn.model.robot_file import toml_literal
 from omnidyn.model.wheels import MAX_WHEELS
 from omnidyn.statement import Statement

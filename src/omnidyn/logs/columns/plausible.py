@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.logs.columns.guessed import UNIT, Doubt, doubt, letter_of
+from omnidyn.logs.columns.doubts import UNIT, Doubt, doubt, letter_of
 from omnidyn.units import Unit, parse_unit
 
 USUAL_SHARE = 0.99  # of the distinct values: some are outliers, or codes of a driver, however often they are repeated

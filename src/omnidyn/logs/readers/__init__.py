@@ -18,4 +18,7 @@ The contract of a reader, the value `Reader` of its file, entered in `READERS` o
    `Recording` makes such tables; what a format itself says of a column stands in `Table.says`.
 7. A file that is cut short, hostile or not what its name says is an InputError with the remedy, never more memory
    than `options.max_bytes` and never a crash; a missing library is a MissingExtraError with the line that installs it.
+left_out: records that cannot be used.
+spaced_text: columns separated by spaces.
+wpilib_structs: struct values of WPILib.
 """

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.logs.columns.guessed import NO_NUMBER
+from omnidyn.logs.columns.doubts import NO_NUMBER
 from omnidyn.logs.readers.recording import Track
 from omnidyn.logs.table.table import Declaration
 from omnidyn.statement import Statement

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, shortened
 from omnidyn.logs.clock.stamps import astray
+from omnidyn.logs.readers.left_out import LeftOut
 from omnidyn.logs.table.dialect import MAX_NAME
 from omnidyn.logs.table.header import MAX_COLUMNS
 from omnidyn.logs.table.rows import Column, refuse_infinite
@@ -222,29 +223,3 @@ def topic_of(name: str, kind: str, stamps: IntArray, read: bool = False, reason:
     positive = steps if len(steps) and steps.min() > 0 else steps[steps > 0]
     rate = 1e9 / float(np.median(positive, overwrite_input=True)) if positive.size else 0.0
     return Topic(shortened(name, MAX_NAME), kind, len(stamps), rate, longest, read, reason)
-
-
-# Records that are whole and cannot be used, one by one: each costs itself, not what follows
-
-
-class LeftOut:
-    """How many records were left out, and why the first was."""
-
-    def __init__(self, count: int = 0, first: str = "") -> None:
-        self.count, self.first = count, first
-
-    def add(self, reason: str) -> None:
-        """One more."""
-        self.count += 1
-        self.first = self.first or reason
-
-    @property
-    def notes(self) -> list[str]:
-        """What is to be said, in words; nothing where all were used."""
-        if not self.count:
-            return []
-        return [
-            f"1 record was left out: {self.first}"
-            if self.count == 1
-            else f"{self.count} records were left out, the first: {self.first}"
-        ]

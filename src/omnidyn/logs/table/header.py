@@ -15,6 +15,7 @@ from typing import NamedTuple
 from omnidyn.errors import InputError
 from omnidyn.logs.table import dialect
 from omnidyn.logs.table.dialect import MAX_NAME, SAMPLE_ROWS, SEPARATOR_WORDS, SEPARATORS
+from omnidyn.logs.table.preamble import preamble
 
 MAX_COLUMNS = 1000
 INDEX = "index"  # what a column of row numbers without a name is called
@@ -343,27 +344,3 @@ def _head_notes(head: _Head, commented: int) -> list[str]:
 
 def _separator_notes(separator: str) -> list[str]:
     return [] if separator == "," else [f"columns are separated by {SEPARATOR_WORDS[separator]}"]
-
-
-# What an instrument or a board says about itself above the names of the columns: model, settings, a greeting
-
-SURE_ROWS = 3  # rows of numbers, one below the other, that are surely a table
-
-
-def preamble(texts: Sequence[str]) -> int:
-    """Number of lines above the names that are no part of the table, 0 where it cannot be told.
-
-    texts: first lines of a file, without comments and blank lines. The names are the words right above the first rows
-    of numbers, with as many cells as those; no line above them has as many.
-    """
-    for separator in dialect.SEPARATORS:
-        widths = [dialect.counts(text, separator)[0] for text in texts]
-        rows = [width > 1 and dialect.looks_like_data(text) for width, text in zip(widths, texts, strict=True)]
-        runs = (k for k in range(len(texts) - SURE_ROWS + 1) if all(rows[k : k + SURE_ROWS]))
-        first = next((k for k in runs if len(set(widths[k : k + SURE_ROWS])) == 1), 0)
-        names = first
-        while names and widths[names - 1] == widths[first] and not rows[names - 1]:
-            names -= 1
-        if names < first and widths[first] not in widths[:names]:
-            return names
-    return 0

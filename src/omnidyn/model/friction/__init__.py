@@ -62,10 +62,10 @@ class Friction(Value):
 
     @model_validator(mode="after")
     def _one_law_about_yaw(self) -> Friction:
-        axes, way = self.axes, self.direction
-        both_act = axes.coulomb[2] > 0.0 and way.yaw_coulomb > 0.0
-        falls = axes.stribeck_speed is not None or way.yaw_stribeck_speed is not None
-        if both_act and (falls or axes.law != "coulomb" or way.law != "coulomb"):
+        axes, direction = self.axes, self.direction
+        both_act = axes.coulomb[2] > 0.0 and direction.yaw_coulomb > 0.0
+        falls = axes.stribeck_speed is not None or direction.yaw_stribeck_speed is not None
+        if both_act and (falls or axes.law != "coulomb" or direction.law != "coulomb"):
             raise ValueError(
                 "friction about yaw stands in [friction.axes] and in [friction.direction], and one of them has another "
                 "law than coulomb: put all of it into one table"

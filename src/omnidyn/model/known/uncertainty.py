@@ -30,7 +30,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import one_by_one
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.keys import Key
-from omnidyn.model.known.told import SIGNED, Told, holding, is_log, numbers_told, told
+from omnidyn.model.known.breakaway_levels import holding
+from omnidyn.model.known.told import SIGNED, Told, is_log, numbers_told, told
 from omnidyn.model.robot import Robot
 
 DRAWS = 100
@@ -111,8 +112,8 @@ def first_order_std(robot: Robot, function: Callable[[Robot], FloatArray]) -> Fl
     size = np.where(uncertain.value == 0.0, uncertain.std, abs(uncertain.value))
     ways = (_root(uncertain.correlation) * uncertain.std[:, None]).T
     ways = ways[ways.any(axis=1)]
-    shares = [SMALL / max(float((abs(way[size > 0.0]) / size[size > 0.0]).max()), SMALL) for way in ways]
-    pairs = [_aside(robot, keys, uncertain, share * way) for share, way in zip(shares, ways, strict=True)]
+    shares = [SMALL / max(float((abs(step[size > 0.0]) / size[size > 0.0]).max()), SMALL) for step in ways]
+    pairs = [_aside(robot, keys, uncertain, share * step) for share, step in zip(shares, ways, strict=True)]
     ends, total = one_by_one(function, [candidate for pair in pairs for candidate in pair]), 0.0
     for share in shares:
         total = total + ((next(ends) - next(ends)) / share) ** 2

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from types import MappingProxyType
 from typing import cast
 
@@ -11,11 +10,9 @@ import numpy as np
 from matplotlib.projections.polar import PolarAxes
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Points
 from omnidyn.model.deadzone import dead_zone_force, dead_zone_map
-from omnidyn.model.known.dead_zone import DeadZone, dead_zone
+from omnidyn.model.known.dead_zone import DeadZone
 from omnidyn.model.robot import Robot
-from omnidyn.report.html import Section, content, paragraph
 from omnidyn.report.style import (
     BLUE,
     GREEN,
@@ -102,24 +99,3 @@ def _caption(robots: Mapping[str, Robot], zones: Mapping[str, DeadZone]) -> str:
         "loaded motor (left) and the push of the motors (right) at which it starts to move. Below that it stays "
         f"exactly at rest. The voltages push along the direction, without a torque.{band}"
     )
-
-
-# The section of a report that says at which voltage the identified robot starts to move
-
-
-def dead_zone_section(robots: Mapping[str, Robot]) -> Section:
-    """Volts and duty of each group's robot, with their intervals, and the map of all directions."""
-    parts = [
-        paragraph(f"{group}:") + _one(group, robot) if len(robots) > 1 else _one("", robot)
-        for group, robot in robots.items()
-    ]
-    return Section("dead-zone", "Dead zone", "".join(parts))
-
-
-def _one(group: str, robot: Robot) -> str:
-    if robot.wheels.traction_mu is not None:
-        return paragraph("Wheels may slip (traction_mu): at which voltage this robot starts to move is not worked out.")
-    zone = dead_zone(robot)
-    zone_map = draw_dead_zone_map({robot.name: robot}, {robot.name: zone})
-    anchor = "".join(c if c.isalnum() or c in "-_." else "-" for c in f"{zone_map.name}{group}")
-    return content(zone.table(), Points(zone.statements()), replace(zone_map, name=anchor))

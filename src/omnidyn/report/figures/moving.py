@@ -49,15 +49,15 @@ class Animation:
 
 def animate(run: Run, robot: Robot) -> Animation:
     """The robot on the way that a run went. Raises InputError for a run that does not say where that is."""
-    way = path_of(run, robot)
-    if way is None:
+    path = path_of(run, robot)
+    if path is None:
         raise InputError(
             "where it went is not in the run",
             got=", ".join(run.channels),
             expected="pose, twist or the wheel speeds of this robot",
             where="run",
         )
-    pose = np.column_stack([way.position, way.heading])
+    pose = np.column_stack([path.position, path.heading])
     known = np.isfinite(pose).all(axis=1)
     return Animation(moving_picture(robot, run.t[known], {robot.name: pose[known]}, pose[known, :2]))
 

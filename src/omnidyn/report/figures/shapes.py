@@ -111,10 +111,10 @@ def draw_polar(study: SteadyStudy) -> Picture:
                 markeredgewidth=0,
                 label=name,
             )
-            way, curve = _curve(study, group, study.choice.of(group), group_points)
+            directions, curve = _curve(study, group, study.choice.of(group), group_points)
             axes.plot(
-                np.radians(way),
-                _along(way, curve),
+                np.radians(directions),
+                _along(directions, curve),
                 color=colour,
                 linestyle=line,
                 linewidth=2.2,  # type: ignore[arg-type]
@@ -132,8 +132,15 @@ def _compared(study: SteadyStudy, axes: PolarAxes, group: str) -> None:
     """The box of the paper and the wheels, of the first group, to compare."""
     for name, (colour, line) in COMPARED.items():
         if name in study.choice.fits and name != study.choice.of(group):
-            way, curve = _curve(study, group, name, _of(study.points, group))
-            axes.plot(np.radians(way), _along(way, curve), color=colour, linestyle=line, linewidth=1.5, label=name)
+            directions, curve = _curve(study, group, name, _of(study.points, group))
+            axes.plot(
+                np.radians(directions),
+                _along(directions, curve),
+                color=colour,
+                linestyle=line,
+                linewidth=1.5,
+                label=name,
+            )
 
 
 def _polar_words(study: SteadyStudy) -> str:
@@ -173,10 +180,10 @@ def draw_components(study: SteadyStudy) -> Picture:
 def _component(study: SteadyStudy, panel: Axes, component: int, group: str, number: int) -> None:
     group_points = _of(study.points, group)
     colour = GROUP_COLOURS[number]
-    way = np.degrees(np.arctan2(group_points.twist[:, 1], group_points.twist[:, 0]))
+    directions = np.degrees(np.arctan2(group_points.twist[:, 1], group_points.twist[:, 0]))
     name = "measured" if group == "all" else group
     panel.plot(
-        way,
+        directions,
         group_points.wrench[:, component],
         GROUP_MARKS[number],
         color=colour,
@@ -196,31 +203,31 @@ def _component(study: SteadyStudy, panel: Axes, component: int, group: str, numb
 def _curve(study: SteadyStudy, group: str, name: str, group_points: ForcePoints) -> tuple[FloatArray, FloatArray]:
     """(direction [degree], driving wrench) of a fitted shape at the middle speed of the group, without turning."""
     fit = study.choice.fits[name][group]
-    way = np.arange(-180.0, 180.0 + STEP_DEG, STEP_DEG) + 0.01  # beside the corners, not on them
+    directions = np.arange(-180.0, 180.0 + STEP_DEG, STEP_DEG) + 0.01  # beside the corners, not on them
     speed = float(np.median(group_points.speed))
-    angle = np.radians(way)
+    angle = np.radians(directions)
     twist = speed * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
-    empty = np.zeros(len(way))
+    empty = np.zeros(len(directions))
     points = replace(
         group_points,
         twist=twist,
         still=empty,
-        wrench=np.zeros((len(way), 3)),
-        wrench_std=np.zeros((len(way), 3)),
-        traction=np.zeros((len(way), group_points.traction.shape[1])),
-        direction=way,
+        wrench=np.zeros((len(directions), 3)),
+        wrench_std=np.zeros((len(directions), 3)),
+        traction=np.zeros((len(directions), group_points.traction.shape[1])),
+        direction=directions,
         travels=empty == 0.0,
         turns=empty > 0.0,
-        group=(group,) * len(way),
+        group=(group,) * len(directions),
         run=empty.astype(np.int64),
         rows=empty.astype(np.int64),
     )
     turning = any(Key.parse(key).axis == YAW for key in fit.keys)
-    return way, SHAPES[name].force(study.robot, points, turning, fit.level)
+    return directions, SHAPES[name].force(study.robot, points, turning, fit.level)
 
 
-def _along(way: FloatArray, wrench: FloatArray) -> FloatArray:
-    angle = np.radians(way)
+def _along(directions: FloatArray, wrench: FloatArray) -> FloatArray:
+    angle = np.radians(directions)
     return wrench[:, 0] * np.cos(angle) + wrench[:, 1] * np.sin(angle)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
-from omnidyn.model.motor import SPEED
+from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.batch.blocks import EXACT_POSE, FAST_POSE, BatchCommands, BlockGroup, GroupRun, drivers_of
 from omnidyn.simulation.batch.engine_kind import BOX, DIRECTION, DUTY, EXACT, GENERAL, VOLTAGE, WHEEL_SPEED, engine_kind

@@ -37,31 +37,34 @@ def engine_kind(robot: Robot, command: str, tol: float | None) -> str:
 
 def _shape(friction: Friction) -> str:
     """BOX or DIRECTION, where no level falls and nothing holds more than it slides with."""
-    axes, way = friction.axes, friction.direction
+    axes, direction = friction.axes, friction.direction
     bare = DirectionFriction(
-        coulomb=way.coulomb,
-        breakaway=way.coulomb,
-        viscous=way.viscous,
-        yaw_coulomb=way.yaw_coulomb,
-        yaw_breakaway=way.yaw_coulomb,
-        yaw_viscous=way.yaw_viscous,
-        ellipse=way.ellipse,
+        coulomb=direction.coulomb,
+        breakaway=direction.coulomb,
+        viscous=direction.viscous,
+        yaw_coulomb=direction.yaw_coulomb,
+        yaw_breakaway=direction.yaw_coulomb,
+        yaw_viscous=direction.yaw_viscous,
+        ellipse=direction.ellipse,
     )
     if friction.wheels != WheelFriction() or not axes.is_plain or axes.breakaway not in (None, axes.coulomb):
         return GENERAL
-    held = way.breakaway or way.coulomb, way.yaw_coulomb if way.yaw_breakaway is None else way.yaw_breakaway
-    if way.replace(breakaway=held[0], yaw_breakaway=held[1]) != bare:
+    held = (
+        direction.breakaway or direction.coulomb,
+        direction.yaw_coulomb if direction.yaw_breakaway is None else direction.yaw_breakaway,
+    )
+    if direction.replace(breakaway=held[0], yaw_breakaway=held[1]) != bare:
         return GENERAL
-    if way.coulomb == (0.0, 0.0):
+    if direction.coulomb == (0.0, 0.0):
         return BOX
-    round_ = way.coulomb[0] == way.coulomb[1] or way.ellipse == "dissipation"
-    return DIRECTION if round_ and min(way.coulomb) > 0.0 and axes.coulomb[:2] == (0.0, 0.0) else GENERAL
+    round_ = direction.coulomb[0] == direction.coulomb[1] or direction.ellipse == "dissipation"
+    return DIRECTION if round_ and min(direction.coulomb) > 0.0 and axes.coulomb[:2] == (0.0, 0.0) else GENERAL
 
 
 def _on_axes(robot: Robot) -> Robot:
     """The robot without turning frame and limit, its damping on the axes: what else the exact engine lacks stays."""
-    way = robot.friction.direction
-    damping = np.add(robot.friction.axes.viscous, (way.viscous, way.viscous, way.yaw_viscous))
+    direction = robot.friction.direction
+    damping = np.add(robot.friction.axes.viscous, (direction.viscous, direction.viscous, direction.yaw_viscous))
     return robot.model_copy(
         update={
             "body": robot.body.model_copy(update={"rotating_frame": False}),

@@ -85,10 +85,10 @@ def batch_parameters(robots: Sequence[Robot]) -> BatchParameters:
 
 
 def _of_robot(robot: Robot) -> tuple[FloatArray, ...]:
-    motors, axes, way = motor_wrench(robot), robot.friction.axes, robot.friction.direction
+    motors, axes, direction = motor_wrench(robot), robot.friction.axes, robot.friction.direction
     viscous, coulomb, breakaway = axes.levels
-    along = np.array([way.viscous, way.viscous, way.yaw_viscous])
-    levels = np.array([*way.coulomb, way.yaw_coulomb])
+    along = np.array([direction.viscous, direction.viscous, direction.yaw_viscous])
+    levels = np.array([*direction.coulomb, direction.yaw_coulomb])
     return (
         motors.driving.T + 0.0,
         viscous + along - np.diag(motors.braking),

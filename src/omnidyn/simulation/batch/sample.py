@@ -12,7 +12,9 @@ Any other number, or one that differs from wheel to wheel, takes a robot of its 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import motor_wrench
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, COULOMB, DIRECTION, EMF, TORQUE, VISCOUS, Key, expand
-from omnidyn.model.known.told import holding
+from omnidyn.model.known.breakaway_levels import holding
 from omnidyn.model.known.uncertainty import MOST_DRAWS, Draws
 from omnidyn.model.mass import added_mass
 from omnidyn.model.robot import Robot
@@ -39,7 +41,7 @@ SPINS = ("motor.gear_ratio", RADIUS)  # they also change the mass of what spins
 LEVELS = (VISCOUS, COULOMB, BREAKAWAY)
 
 
-class Sample:
+class Sample(Sequence[Robot]):
     """Robots drawn around one. center: that robot; keys, values (n, keys): what was drawn, in the unit of each key.
 
     parameters: of all of them, for blocks; None where each takes a robot of its own. A sequence of robots, each made as
@@ -55,14 +57,16 @@ class Sample:
     def __len__(self) -> int:
         return len(self.values)
 
-    def __iter__(self) -> Iterator[Robot]:
-        return (self._robot_of(k) for k in range(len(self)))
+    def __getitem__(self, k: Any) -> Any:
+        """Robot k, from the end where it is negative; a list of them for a slice."""
+        places = range(len(self))[k]
+        return self._robot_of(places) if isinstance(places, int) else [self._robot_of(place) for place in places]
 
     def robot(self, k: int) -> Robot:
-        """Robot k of the sample."""
-        if not 0 <= k < len(self):
+        """Robot k of the sample. Raises InputError where there is none."""
+        if not 0 <= operator.index(k) < len(self):
             raise InputError("no such robot", got=k, expected=f"0 to {len(self) - 1}", where="robot")
-        return self._robot_of(k)
+        return self[k]
 
     def __repr__(self) -> str:
         return f"<Sample of {len(self)} robots around {self.center.name}: {', '.join(self.keys)}>"
@@ -112,7 +116,7 @@ def sample(
     low, high = np.array(list(ends.values())).T
     values = low + (high - low) * np.random.default_rng(seed).random((count, len(ends)))
     keys = [Key.parse(name) for name in ends]
-    return Sample(center, list(ends), values, lambda k: _with(center, keys, values[k]))
+    return Sample(center, list(ends), values, partial(_row, center, keys, values))
 
 
 def _ends(
@@ -138,6 +142,10 @@ def _ends(
                 _check(center, text, end)
             ends[text] = low, high
     return ends
+
+
+def _row(center: Robot, keys: Sequence[Key], values: FloatArray, k: int) -> Robot:
+    return _with(center, keys, values[k])
 
 
 def _with(center: Robot, keys: Sequence[Key], values: FloatArray) -> Robot:

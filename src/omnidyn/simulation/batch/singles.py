@@ -9,9 +9,9 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError
-from omnidyn.model.motor import BRAKE
-from omnidyn.model.motor import DUTY as DUTY_DRIVE
-from omnidyn.model.motor import VOLTAGE as VOLTAGE_DRIVE
+from omnidyn.model.drive import BRAKE
+from omnidyn.model.drive import DUTY as DUTY_DRIVE
+from omnidyn.model.drive import VOLTAGE as VOLTAGE_DRIVE
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.batch.blocks import BatchCommands, GroupRun
 from omnidyn.simulation.batch.engine_kind import DUTY, VOLTAGE

@@ -16,9 +16,10 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.keys import Key, expand
 from omnidyn.model.known.uncertainty import plausible
-from omnidyn.model.motor import DUTY, DYNAMIC, SPEED
+from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.batch.engine_kind import BOX, DIRECTION, EXACT, VOLTAGE, engine_kind

@@ -67,17 +67,17 @@ def add_node(place, speed, drive, law, t, weight):
         v, kv, kg, kc, ka = step_slopes(speed[axis], drive[axis], law[1, axis], law[2, axis], law[0, axis], phi, dphi)
         along, sideways = (cos, sin) if axis == 0 else (-sin, cos)
         vx, vy = (v, vy) if axis == 0 else (vx, v)
-        for row, way in ((X, along), (Y, sideways)):
-            place[row, VALUE] += way * v
-            place[row, BY_SPEED + axis] += way * kv
-            place[row, BY_DRIVE + axis] += way * kg
-            place[row, BY_COULOMB + axis] += way * kc
-            place[row, BY_RATE + axis] += way * ka
-    for row, way in ((X, -(sin * vx + cos * vy)), (Y, cos * vx - sin * vy)):
-        place[row, BY_SPEED + 2] += way * by_speed
-        place[row, BY_DRIVE + 2] += way * by_drive
-        place[row, BY_COULOMB + 2] += way * by_coulomb
-        place[row, BY_RATE + 2] += way * by_rate
+        for row, direction in ((X, along), (Y, sideways)):
+            place[row, VALUE] += direction * v
+            place[row, BY_SPEED + axis] += direction * kv
+            place[row, BY_DRIVE + axis] += direction * kg
+            place[row, BY_COULOMB + axis] += direction * kc
+            place[row, BY_RATE + axis] += direction * ka
+    for row, direction in ((X, -(sin * vx + cos * vy)), (Y, cos * vx - sin * vy)):
+        place[row, BY_SPEED + 2] += direction * by_speed
+        place[row, BY_DRIVE + 2] += direction * by_drive
+        place[row, BY_COULOMB + 2] += direction * by_coulomb
+        place[row, BY_RATE + 2] += direction * by_rate
 
 
 @part

@@ -88,14 +88,14 @@ def travel_slopes(speed, drive, coulomb, breakaway, rate, dt, phi, dphi, psi, dp
     if rests:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     if not crosses:
-        way = x * phi + (q - coulomb) * psi
+        travel = x * phi + (q - coulomb) * psi
         by_speed, by_drive, by_coulomb = phi, psi, -psi
         by_rate = x * dphi + (q - coulomb) * dpsi
     else:
         divisor = coulomb - q
         event = crossing_time(x, q, coulomb, rate, dt)
         phi1, dphi1, psi1, dpsi1 = hold_slopes(rate, event)
-        way = x * phi1 - divisor * psi1
+        travel = x * phi1 - divisor * psi1
         by_speed, by_drive, by_coulomb = phi1, psi1, -psi1
         by_rate = x * dphi1 - divisor * dpsi1
         if reverses:
@@ -107,11 +107,11 @@ def travel_slopes(speed, drive, coulomb, breakaway, rate, dt, phi, dphi, psi, dp
             back = -phi2 * after
             late = -x * rest / divisor  # dt/dD
             by_clock = x * rest / rate - event / rate  # dt/da
-            way += after * psi2
+            travel += after * psi2
             by_speed += back * rest
             by_drive += psi2 - back * late
             by_coulomb += psi2 + back * late
             by_rate += after * dpsi2 + back * by_clock
     if mirrored:
-        return -way, by_speed, by_drive, -by_coulomb, -by_rate
-    return way, by_speed, by_drive, by_coulomb, by_rate
+        return -travel, by_speed, by_drive, -by_coulomb, -by_rate
+    return travel, by_speed, by_drive, by_coulomb, by_rate

@@ -19,11 +19,12 @@ import omnidyn
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.model.actuation import reaching
+from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.dynamics import friction_wrench, settled_currents
 from omnidyn.model.keys import WHEELS, Key, friction_keys
-from omnidyn.model.motor import DUTY, SPEED, traction
+from omnidyn.model.motor import traction
 from omnidyn.model.robot import Robot
-from omnidyn.model.surroundings import Battery, Payload
+from omnidyn.model.variations import Battery, Payload
 from omnidyn.model.vary import times_friction
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.report.figures.robot import wheel_lines, wheel_places

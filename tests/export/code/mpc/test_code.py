@@ -14,9 +14,9 @@ from omnidyn.control.mpc.riccati import CP, CV, GX, GY, HP, HV, PULL, WEIGHT, E,
 from omnidyn.control.paths.path import path
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.code.c_controller import c_controller
+from omnidyn.model.drive import Drive
 from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
 from omnidyn.model.log_effects import Sensors
-from omnidyn.model.motor import Drive
 from omnidyn.simulation.live import LiveRobot
 from tests.support.controlled import CController
 from tests.support.exported import STRICT

@@ -9,7 +9,8 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.begin import begun
-from omnidyn.identification.output_error.prepare import motion, read_records
+from omnidyn.identification.output_error.moved_axes import motion
+from omnidyn.identification.output_error.prepare import read_records
 from omnidyn.identification.output_error.solve.loop import loop_pieces
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.wheels import Wheels

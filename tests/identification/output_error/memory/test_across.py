@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.memory.whitening import correlation
+from omnidyn.identification.output_error.memory.common_errors import correlation
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import TRUTH, voltages

@@ -8,8 +8,8 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear.random_effects import RandomEffects, drawn_together
+from omnidyn.identification.output_error.linear.rounded_inputs import effects
 from omnidyn.identification.output_error.linear.rows import FitRows, Linear, noise_models
-from omnidyn.identification.output_error.linear.sensitivity import effects
 from omnidyn.identification.output_error.memory.autoregression import _without_empty_axes
 from omnidyn.identification.output_error.problem import problem as module
 from omnidyn.identification.output_error.problem.problem import ROWS, bounded

@@ -7,7 +7,7 @@ from benchmarks.wrong_worlds.log import AR, COUNTS, SPEEDS, TICKS, TWIST, Case, 
 from benchmarks.wrong_worlds.world import World
 from omnidyn.identification.output_error.problem.nuisances import least_that_drove, nuisance_parameters
 from omnidyn.identification.output_error.problem.record import record
-from omnidyn.model.motor import Drive
+from omnidyn.model.drive import Drive
 from tests.support import real_logs as real
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.output_error.problem.outputs import is_wheel_odometry, outputs_of, redundant
+from omnidyn.identification.output_error.problem.outputs import outputs_of
+from omnidyn.identification.output_error.problem.redundant_channels import is_wheel_odometry, redundant
 from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.output_error.solve.steps import FLAT, STEEP, Bend
+from omnidyn.identification.output_error.solve.curvature import FLAT, STEEP, Bend
 
 COUNT = 4
 ALL = np.zeros(COUNT, bool)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from omnidyn.identification.output_error.solve.steps import Edges
+from omnidyn.identification.output_error.solve.latency_edges import Edges
 
 NAMES = ["motor.resistance_ohm", "latency.wheel_speed", "latency.twist@b", "latency.current"]
 NONE = np.zeros(4, bool)

@@ -7,7 +7,8 @@ import omnidyn.identification.output_error.solve.solver as solver_module
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.prepare import make_problem, motion, read_records
+from omnidyn.identification.output_error.moved_axes import motion
+from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.output_error.solve.solver import END_PRECISION, MAX_ITERATIONS, Solver, State
 from omnidyn.model import dynamics

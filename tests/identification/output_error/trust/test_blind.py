@@ -13,7 +13,7 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.advice import advice
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.trust.cures import _lost, _sparse
+from omnidyn.identification.output_error.trust.blind_directions import _lost, _sparse
 
 BY_NAME = {setup.name: setup for setup in (*DEFICIENT, *FULL)}
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omnidyn.identification.output_error.trust.levels import likely_levels
+from omnidyn.identification.output_error.trust.level_search import likely_levels
 
 EDGES = np.array([2.0, 2.35, 2.5, 2.52, 3.0, 4.0])  # of plateaus, of which the fourth is narrow, and the best
 COSTS = np.array([400.0, 90.0, 30.0, 0.0, 25.0, 300.0, 900.0])

@@ -11,9 +11,9 @@ from typing import Any, Generic, Self, TypeVar
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.kernel import kernel
+from omnidyn.identification.output_error.engines.row_sums import row_squares, row_terms, row_waves
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
-from omnidyn.identification.output_error.kernel.march_sums import FINAL, WAVES, add_waves, terms_of
+from omnidyn.identification.output_error.kernel.march_sums import FINAL, WAVES
 from omnidyn.identification.output_error.problem.problem import (
     Column,
     FitProblem,
@@ -21,9 +21,7 @@ from omnidyn.identification.output_error.problem.problem import (
     Piece,
     PieceSums,
     Point,
-    Problem,
 )
-from omnidyn.model.actuation import Driver
 from omnidyn.model.layout import N_AXES
 
 P = TypeVar("P", bound=FitProblem)
@@ -156,71 +154,3 @@ def added(piece: Piece, all_columns: tuple[Column, ...], parts: Parts, weighting
         drift,
         waves,
     )
-
-
-# The driver of a problem: what is free of it and what is not
-
-LATENCY_PREFIX = "latency."
-
-
-def driver_of(problem: Problem, values: FloatArray) -> tuple[Driver, list[int]]:
-    """(the driver at these values, index of each of its numbers among the parameters or -1)."""
-    indices = [problem.where(name) for name in Driver._fields]
-    default_driver = Driver(dead_band=problem.robot.drive.dead_band)
-    return Driver(
-        *(
-            float(values[k]) if k >= 0 else default_value
-            for k, default_value in zip(indices, default_driver, strict=True)
-        )
-    ), indices
-
-
-def late_by(problem: Problem, values: FloatArray, columns: Sequence[Column]) -> tuple[list[float], list[int]]:
-    """(by how much each column is late [s], index of that among the parameters or -1: as late as the robot's drive)."""
-    indices = [problem.where(LATENCY_PREFIX + name) for name, _ in columns]
-    return [float(values[k]) if k >= 0 else problem.robot.drive.latency for k in indices], indices
-
-
-# What rows that were simulated before add up to; apart from the engines, so that few edits compile it anew
-
-
-@kernel
-def row_terms(residual, variance, nu, tick, share, final):
-    """(w r, w r^2, curvature, rho) of every residual (C, rows), see kernel/march_sums.py; 0 where it is NaN."""
-    columns, rows = residual.shape
-    terms = np.zeros((4, columns, rows))
-    for c in range(columns):
-        for k in range(rows):
-            if residual[c, k] == residual[c, k]:
-                pull, square, curvature, rho = terms_of(residual[c, k], variance, nu, c, tick, share, final)
-                terms[0, c, k], terms[1, c, k], terms[2, c, k], terms[3, c, k] = pull, square, curvature, rho
-    return terms
-
-
-@kernel
-def row_waves(slopes, turns, count):
-    """Sum over the rows of (cos, sin)(2 pi m turns) J, m = 1 to `count`; turns (C, rows), NaN where there is none."""
-    columns, rows, width = slopes.shape
-    sums = np.zeros((columns, count, 2, width))
-    for c in range(columns):
-        for k in range(rows):
-            if turns[c, k] == turns[c, k]:
-                add_waves(sums[c], slopes[c, k], turns[c, k])
-    return sums
-
-
-@kernel
-def row_squares(slopes, weight):
-    """Sum over the rows of weight J J'. Shapes (C, rows, U), (C, rows) -> (C, U, U)."""
-    columns, rows, count = slopes.shape
-    sums = np.zeros((columns, count, count))
-    for c in range(columns):
-        for k in range(rows):
-            for a in range(count):
-                weighted_slope = weight[c, k] * slopes[c, k, a]
-                for b in range(a + 1):
-                    sums[c, a, b] += weighted_slope * slopes[c, k, b]
-        for a in range(count):
-            for b in range(a):
-                sums[c, b, a] = sums[c, a, b]
-    return sums

@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.engines.engine import FitEngine, Weighting, driver_of, late_by
+from omnidyn.identification.output_error.engines.driver import driver_of, late_by
+from omnidyn.identification.output_error.engines.engine import FitEngine, Weighting
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
 from omnidyn.identification.output_error.kernel.march_axis import (
     GRAD,

@@ -17,7 +17,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import side_by_side
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX, FitEngine, driver_of, late_by
+from omnidyn.identification.output_error.engines.driver import LATENCY_PREFIX, driver_of, late_by
+from omnidyn.identification.output_error.engines.engine import FitEngine
 from omnidyn.identification.output_error.engines.exact import HEADING, POSITION, PUSH, TILT
 from omnidyn.identification.output_error.engines.valley import bent
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
@@ -25,7 +26,7 @@ from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
-from omnidyn.model.known.told import holding
+from omnidyn.model.known.breakaway_levels import holding
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.sensitivity.directions import EPS, difference

@@ -10,7 +10,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX
+from omnidyn.identification.output_error.engines.driver import LATENCY_PREFIX
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, Shown, through_the_end, travel_of
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
 from omnidyn.model.motor import DYNAMIC

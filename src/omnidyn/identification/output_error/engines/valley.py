@@ -26,8 +26,8 @@ ROUNDS = 3  # of Newton's method: each leaves the square of what was left
 def bent(problem: Problem, inner: FloatArray, step: FloatArray) -> FloatArray:
     """The step (P,) from the numbers `inner` (P,) that the solver sees, bent; as it is where it would bend back."""
     parameters = problem.robot_parameters
-    here, way = inner[: len(parameters)], step[: len(parameters)]
-    if not way.any():
+    here, inner_step = inner[: len(parameters)], step[: len(parameters)]
+    if not inner_step.any():
         return step
 
     def at(numbers: FloatArray) -> FloatArray:
@@ -38,11 +38,13 @@ def bent(problem: Problem, inner: FloatArray, step: FloatArray) -> FloatArray:
     start, sizes = at(here), EPS * np.maximum(np.abs(here), 1e-3)
     changes = [at(here + move) - at(here - move) for move in np.diag(sizes)]
     slopes = np.stack(changes, axis=1) / (2.0 * sizes)
-    back = np.abs(way)[:, None] * np.linalg.pinv(slopes * np.abs(way), rcond=RANK)  # what does not move stays
-    goal, there = start + slopes @ way, here + way
+    back = np.abs(inner_step)[:, None] * np.linalg.pinv(
+        slopes * np.abs(inner_step), rcond=RANK
+    )  # what does not move stays
+    goal, there = start + slopes @ inner_step, here + inner_step
     for _ in range(ROUNDS):
         there = there + back @ (goal - at(there))
-        if not np.all(np.isfinite(there)) or np.any(np.abs(there - here - way) > np.abs(way)):
+        if not np.all(np.isfinite(there)) or np.any(np.abs(there - here - inner_step) > np.abs(inner_step)):
             return step
     return np.concatenate([there - here, step[len(parameters) :]])
 

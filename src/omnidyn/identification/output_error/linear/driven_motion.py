@@ -13,14 +13,15 @@ from functools import cached_property
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.output_error.engines.engine import driver_of
+from omnidyn.identification.output_error.engines.driver import driver_of
 from omnidyn.identification.output_error.problem.heading import HEADING, facing_at_start
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors, without_map
+from omnidyn.model.drive import SPEED
 from omnidyn.model.dynamics import acceleration, settled_currents
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.mass import mass_matrix
-from omnidyn.model.motor import SPEED, per_wheel, settled_current
+from omnidyn.model.motor import per_wheel, settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.simulate import simulate
@@ -56,8 +57,8 @@ class DrivenMotion:
     @cached_property
     def turned(self) -> FloatArray:
         """How far each wheel has turned since the first row [rad]. Shape (n, W)."""
-        way = 0.5 * (self.twist[1:] + self.twist[:-1]) * np.diff(self.t)[:, None]
-        angles = np.cumsum(way @ self.robot.wheels.wrench_matrix, axis=0) / self.robot.wheels.radii
+        travel = 0.5 * (self.twist[1:] + self.twist[:-1]) * np.diff(self.t)[:, None]
+        angles = np.cumsum(travel @ self.robot.wheels.wrench_matrix, axis=0) / self.robot.wheels.radii
         return np.append(np.zeros_like(angles[:1]), angles, axis=0)
 
     def twist_by(self, force: FloatArray) -> FloatArray:

@@ -4,4 +4,7 @@ parameters and primitives (from them to numbers of the step), friction_laws (of 
 log), outputs (channels, those computed from others too), differences (of counts, added up), heading (where the robot
 faces), starts (where friction begins), nuisances (what the log does), problem (all of it), decimated (its means over
 some rows).
+karnopp: Karnopp's band in a fit.
+bristles: where the damping of bristles starts.
+redundant_channels: channels computed from others.
 """

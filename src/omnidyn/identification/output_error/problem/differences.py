@@ -118,8 +118,8 @@ def _ticks(logs: Sequence[Run], has_stamps: bool) -> FloatArray | None:
     """
     ways = np.concatenate([_way(run, has_stamps) for run in logs])
     ticks = np.full(ways.shape[1], np.nan)
-    for w, way in enumerate(ways.T):
-        finite_ways = way[np.isfinite(way)]
+    for w, signs in enumerate(ways.T):
+        finite_ways = signs[np.isfinite(signs)]
         if finite_ways.any():
             ticks[w] = find_tick(np.cumsum(finite_ways)) or np.inf
     if np.isnan(ticks).all() or np.isinf(ticks).any():

@@ -16,7 +16,7 @@ from omnidyn.identification.output_error.problem.differences import Differences
 from omnidyn.identification.output_error.problem.outputs import LOG, outputs_of
 from omnidyn.logs.segments import segments
 from omnidyn.model.actuation import asked_voltage, clip_voltage, mapped
-from omnidyn.model.motor import SPEED
+from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import refuse_slip, wheel_speed

@@ -18,6 +18,8 @@ from omnidyn.identification.output_error.engines.engine import FitEngine, P, Wei
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
 from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import FitProblem, PieceSums, Point, per_column
+from omnidyn.identification.output_error.solve.curvature import Bend
+from omnidyn.identification.output_error.solve.latency_edges import Edges
 from omnidyn.identification.output_error.solve.normal_equations import (
     SPEED_LIMITS,
     damped,
@@ -25,7 +27,7 @@ from omnidyn.identification.output_error.solve.normal_equations import (
     solve_balanced,
     weighted,
 )
-from omnidyn.identification.output_error.solve.steps import Bend, Edges, Order
+from omnidyn.identification.output_error.solve.steps import Order
 from omnidyn.progress import Progress, Report
 from omnidyn.statement import Statement
 

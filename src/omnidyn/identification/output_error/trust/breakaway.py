@@ -27,11 +27,12 @@ from omnidyn.identification.output_error.problem.friction_laws import coulomb_be
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
-from omnidyn.identification.output_error.trust.levels import Place, likely_levels, trade
+from omnidyn.identification.output_error.trust.level_search import likely_levels
+from omnidyn.identification.output_error.trust.levels import Place, trade
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust
 from omnidyn.model.friction.kinds import KINDS
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, Key, in_words
-from omnidyn.model.known.told import slides, slides_least
+from omnidyn.model.known.breakaway_levels import slides, slides_least
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 

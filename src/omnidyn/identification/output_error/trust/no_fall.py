@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.solve.steps import Order
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, LIMIT
-from omnidyn.identification.output_error.trust.support import at_the_end
+from omnidyn.identification.output_error.trust.search_ends import at_the_end
 from omnidyn.identification.output_error.trust.uncertainty import RISE, Trust
 from omnidyn.statement import WARNING, Statement
 
@@ -63,10 +63,12 @@ def _not_seen(solution: Solution, uncertainty: Trust) -> list[tuple[int, int, in
         name = speed_of(problem.names[s], problem.names)
         if not name:
             continue
-        v, way = problem.where(name), np.zeros(len(values))
-        way[[s, c]] = 1.0, -1.0
-        spread = np.sqrt(way @ np.where(np.isfinite(uncertainty.covariance), uncertainty.covariance, 0.0) @ way)
-        if uncertainty.open[v] or name in names_at_bound or way @ values <= uncertainty.quantile * spread:
+        v, direction = problem.where(name), np.zeros(len(values))
+        direction[[s, c]] = 1.0, -1.0
+        spread = np.sqrt(
+            direction @ np.where(np.isfinite(uncertainty.covariance), uncertainty.covariance, 0.0) @ direction
+        )
+        if uncertainty.open[v] or name in names_at_bound or direction @ values <= uncertainty.quantile * spread:
             triples.append((s, c, v))
     return triples
 
@@ -94,12 +96,12 @@ def _likely(solution: Solution, s: int, v: int, coulomb: float, limit: float) ->
     }
     best, cost_limit = min(cost_by_level, key=lambda level: cost_by_level[level]), min(cost_by_level.values()) + limit
 
-    def end(way: int, last: float) -> float:
+    def end(direction: int, last: float) -> float:
         """Where likely levels end, upward (1) or downward (-1), looked for no further than `last`."""
-        inner_level, share = best, way * STEP
-        while cost(outer_level := way * min(way * best * (1.0 + share), way * last)) <= cost_limit:
+        inner_level, share = best, direction * STEP
+        while cost(outer_level := direction * min(direction * best * (1.0 + share), direction * last)) <= cost_limit:
             if outer_level == last:
-                return np.inf if way > 0 else last
+                return np.inf if direction > 0 else last
             inner_level, share = outer_level, 2.0 * share
         for _ in range(HALVINGS):
             middle = 0.5 * (inner_level + outer_level)

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.output_error.engines.engine import FitEngine, Weighting
-from omnidyn.identification.output_error.problem.parameters import AT
-from omnidyn.identification.output_error.problem.problem import PieceSums, Point, Problem
+from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
+from omnidyn.identification.output_error.trust.tied_numbers import tied
 from omnidyn.identification.output_error.trust.uncertainty import Trust
-from omnidyn.identification.steady.study_table import Difference
 from omnidyn.statistics import central_interval, t_quantile
 
 OUTWARD_STEPS, HALVINGS = 12, 12  # steps of 1.5 standard errors out, then halvings
@@ -128,8 +125,8 @@ def profile_interval(solver: Solver, solution: Solution, uncertainty: Trust, ind
     parameter = solver.problem.parameters[index]
     best = parameter.inner(float(solution.state.point.values[index]))
     low, high = (
-        _end(solver, solution, index, best, way * (std if std > 0.0 else abs(best) or 1.0), limit)
-        for way in (-1.0, 1.0)
+        _end(solver, solution, index, best, side * (std if std > 0.0 else abs(best) or 1.0), limit)
+        for side in (-1.0, 1.0)
     )
     return parameter.outer(low), parameter.outer(high)
 
@@ -146,12 +143,12 @@ def difference_interval(
     values, states = solution.state.point.values, solution.state.point.states
 
     def rise(change: float, point: Point) -> tuple[float, Point]:
-        engine = TiedEngine(solver.engine, first, second, change)
+        engine = tied(solver.engine, first, second, change)
         tied_solution = Solver(engine.problem, engine, solver.nu, counts_ticks=solver.counted).minimise(point)
         return 2.0 * (tied_solution.state.objective - solution.state.objective), tied_solution.state.point
 
     best, point = float(values[second] - values[first]), Point(np.delete(values, second), states)
-    low, high = (_crossing(rise, best, way * std, way * np.inf, point, limit) for way in (-1.0, 1.0))
+    low, high = (_crossing(rise, best, side * std, side * np.inf, point, limit) for side in (-1.0, 1.0))
     return low, high
 
 
@@ -268,99 +265,3 @@ def runs_by_group(solver: Solver, strata: Strata | None) -> dict[str, list[int]]
     for run in dict.fromkeys(id(piece.record) for piece in solver.problem.pieces):
         runs_of_group.setdefault(strata[run] if strata else "", []).append(run)
     return runs_of_group
-
-
-# A problem in which one number is another one plus a given change: for the profile of a difference
-
-
-class TiedEngine(FitEngine[Problem]):
-    """An engine whose parameter `second` is `first` plus `change`, and so no longer free. Neither has a prior."""
-
-    def __init__(self, engine: FitEngine, first: int, second: int, change: float):
-        self._engine, self._first, self._second, self._change = engine, first, second, change
-        full_problem, parameters = engine.problem, list(engine.problem.parameters)
-        first_parameter, second_parameter = parameters[first], parameters[second]
-        parameters[first] = replace(
-            first_parameter,
-            low=max(first_parameter.low, second_parameter.low - change),
-            high=min(first_parameter.high, second_parameter.high - change),
-        )
-        del parameters[second]
-        count = full_problem.robot_count - (second < full_problem.robot_count)
-        self.problem: Problem = replace(full_problem, parameters=tuple(parameters), robot_count=count)
-
-    def on(self, problem: Problem) -> TiedEngine:
-        """The same engine on other pieces of the same logs."""
-        full_problem = replace(self._engine.problem, pieces=problem.pieces)
-        return TiedEngine(self._engine.on(full_problem), self._first, self._second, self._change)
-
-    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
-        """The sums of the whole problem; what slopes by `second` is added to what slopes by `first`."""
-        kept_indices = np.delete(np.arange(len(point.values) + 1), self._second)
-        values = np.empty(len(point.values) + 1)
-        values[kept_indices] = point.values
-        values[self._second] = values[self._first] + self._change
-        return [self._folded(sums) for sums in self._engine.sums(Point(values, point.states), weighting)]
-
-    def _folded(self, sums: PieceSums) -> PieceSums:
-        grad, score = self._along(sums.grad, 1), self._along(sums.score, 1)
-        return replace(sums, grad=grad, score=score, info=self._along(self._along(sums.info, 1), 2), waves=None)
-
-    def _along(self, values: FloatArray, axis: int) -> FloatArray:
-        moved_values = np.moveaxis(values, axis, 0).copy()
-        moved_values[self._first] += moved_values[self._second]
-        return np.moveaxis(np.delete(moved_values, self._second, axis=0), 0, axis)
-
-
-# What differs between groups that were fitted together: second minus first, with an interval of its own
-
-
-def differences(
-    solution: Solution,
-    uncertainty: Trust,
-    resampled_fit: Resampled,
-    own_keys: Iterable[str],
-    groups: Sequence[str],
-    profile: Sequence[str],
-    strata: Strata,
-) -> tuple[Difference, ...]:
-    """Every number of `own_keys` between every two groups that have it and determine it.
-
-    Its interval is by profile where that is asked for, from draws of a bootstrap where there are any, else to first
-    order in the covariance.
-    """
-    names = solution.solver.problem.names
-    group_differences = []
-    for key in own_keys:
-        groups_with_key = [group for group in groups if f"{key}{AT}{group}" in names]
-        for first, second in combinations(groups_with_key, 2):
-            a, b = names.index(f"{key}{AT}{first}"), names.index(f"{key}{AT}{second}")
-            if uncertainty.blind_parameters[a] or uncertainty.blind_parameters[b]:
-                continue
-            pair = float(solution.state.point.values[a]), float(solution.state.point.values[b])
-            std, low, high = _interval(solution, uncertainty, resampled_fit, a, b, strata, key in profile)
-            group_differences.append(Difference(key, first, second, pair, pair[1] - pair[0], std, low, high))
-    return tuple(group_differences)
-
-
-def _interval(
-    solution: Solution, uncertainty: Trust, resampled_fit: Resampled, a: int, b: int, strata: Strata, profiled: bool
-) -> tuple[float, float, float]:
-    """(std, low, high) of number b minus number a."""
-    solver, values = solution.solver, solution.state.point.values
-    change = float(values[b] - values[a])
-    direction = np.zeros(len(values))  # the change of the numbers that the solver sees, to first order
-    direction[a], direction[b] = (
-        side * solver.problem.parameters[k].slope(float(values[k])) for side, k in ((-1.0, a), (1.0, b))
-    )
-    if resampled_fit.draws is not None:
-        difference_draws = resampled_fit.draws[:, b] - resampled_fit.draws[:, a]
-        std = widening_of_std(least_runs(solver, strata)) * float(difference_draws.std(ddof=1))
-        low, high = draw_interval(change, difference_draws, resampled_fit.widening)
-    else:
-        covariance = np.where(np.isfinite(uncertainty.covariance), uncertainty.covariance, 0.0)
-        std = float(np.sqrt(max(direction @ covariance @ direction, 0.0)))
-        low, high = change - uncertainty.quantile * std, change + uncertainty.quantile * std
-    if profiled and std > 0.0:
-        low, high = difference_interval(solver, solution, a, b, std, uncertainty.rise(direction)) or (low, high)
-    return std, low, high

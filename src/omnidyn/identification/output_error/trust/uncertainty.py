@@ -15,7 +15,6 @@ beyond chance. No variance is below the plain one, of a number or of what severa
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,12 +24,11 @@ from scipy.special import chdtri
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.engine import Weighting
-from omnidyn.identification.output_error.kernel.counts import HARMONICS, LEAST_SHARE, information, rounding
-from omnidyn.identification.output_error.kernel.march_sums import FINAL, WAVES
+from omnidyn.identification.output_error.kernel.march_sums import FINAL
 from omnidyn.identification.output_error.problem.problem import PieceSums, Problem, per_column
-from omnidyn.identification.output_error.solve.normal_equations import of_states
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
-from omnidyn.identification.output_error.trust.cures import Way, blind_ways
+from omnidyn.identification.output_error.trust.blind_directions import Way, blind_ways
+from omnidyn.identification.output_error.trust.rounding_scatter import rounding_scatter, silent
 from omnidyn.statistics import t_quantile
 
 BLOCKS, LEAST_BLOCK = 100, 8  # blocks in all; rows of one, at least
@@ -98,17 +96,17 @@ class Trust:
         """The same beside numbers that are only known so far: what a std of each moves the parameters by, (P, K)."""
         return replace(self, covariance=self.covariance + shifts @ shifts.T)
 
-    def rise(self, way: FloatArray) -> float:
+    def rise(self, direction: FloatArray) -> float:
         """2 (F - least F) at the ends of a 95 % interval of the sum of way (P,) times the parameters.
 
         3.84 where noise is white. Elsewhere the likelihood is too steep, and as much more of it as the variance is
         larger than its curvature tells: Kent, Biometrika 69 (1982); Royall, Tsou, J. R. Stat. Soc. B 65 (2003).
         """
-        slope_square = float(way @ self.plain_covariance @ way)
+        slope_square = float(direction @ self.plain_covariance @ direction)
         if self.kind == WHITE or slope_square <= 0.0:
             return RISE
         finite_covariance = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
-        return self.quantile**2 * float(way @ finite_covariance @ way) / slope_square
+        return self.quantile**2 * float(direction @ finite_covariance @ direction) / slope_square
 
 
 def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
@@ -279,10 +277,10 @@ def _seen(
         for value, vector in zip(values, vectors.T, strict=True):
             held_share = float(vector**2 @ (prior[seen_indices] / size**2))
             if value < WEAK_EIGENVALUE and not (held_share > 0.0 and held_share > 0.5 * value):
-                way = np.zeros(len(diagonal))
-                way[seen_indices] = vector / size / relative[seen_indices]
-                way /= np.abs(way).max()
-                directions.append((float(value), way))
+                direction = np.zeros(len(diagonal))
+                direction[seen_indices] = vector / size / relative[seen_indices]
+                direction /= np.abs(direction).max()
+                directions.append((float(value), direction))
                 if value < BLIND_EIGENVALUE:
                     lost.append(np.zeros(len(diagonal)))
                     lost[-1][seen_indices] = vector
@@ -382,78 +380,3 @@ def from_the_log_alone(problem: Problem, uncertainty: Trust) -> Trust | None:
     covariance[np.ix_(log_numbers, log_numbers)] = 0.5 * (log_covariance + log_covariance.T)
     np.fill_diagonal(covariance, np.maximum(np.diag(covariance), 0.0))
     return replace(uncertainty, covariance=covariance)
-
-
-# The spread of a fit to counts that show no noise: what an encoder rounds off is a function of the angle
-#
-# Between its ticks the angle of a wheel begins anywhere; nothing else is left to chance. A row pulls at the fit by
-# E x/s (kernel/counts.py), odd in r = y - f and of period q, E x = sum b_m sin(2 pi m r/q), where r = -(f + phase)
-# up to whole ticks. Over all phases
-#
-#     var of the score = sum over m of b_m^2/(2 s^2) |sum over rows of exp(2 pi i m f/q) J|^2
-#
-# so that rows at rest, which repeat one another, and the saw teeth of a slow wheel count as what they are. The phases
-# of
-# wheels and pieces are independent; the harmonics beyond HARMONICS are taken as if rows were. With H the curvature that
-# rows have in the mean over all phases, the covariance is H^-1 (var of the score) H^-1. Source: White, Econometrica 50
-# (1982), for a likelihood that is not that of the data: the solver takes the noise to be LEAST_SHARE of a tick at
-# least.
-
-STEPS = 4096  # of the integrals over a tick
-NOISE_TOLERANCE = 1e-6  # relative, to the least variance: the noise does not show
-
-
-def silent(solver: Solver, solution: Solution) -> BoolArray:
-    """Columns of counts whose noise does not show. Shape (columns,)."""
-    return (solver.tick > 0.0) & (solution.state.variance <= (1.0 + NOISE_TOLERANCE) * (LEAST_SHARE * solver.tick) ** 2)
-
-
-def rounding_scatter(solver: Solver, solution: Solution) -> tuple[FloatArray, FloatArray]:
-    """(H, variance of the score), priors and other columns included, in the numbers that the solver sees: (P, P) each.
-
-    States of the pieces are eliminated. Needs an engine that knows counts.
-    """
-    state, is_quiet = solution.state, silent(solver, solution)
-    ones = np.ones(len(state.variance))
-    sums = solver.engine.sums(state.point, Weighting(ones))  # sum of J J'
-    waves = solver.engine.sums(state.point, Weighting(state.variance, mode=WAVES, counts_ticks=True))
-    usual_curvature = information(state.variance, solver.tick)[0]
-    if solver.nu:
-        usual_curvature = np.where(solver.tick > 0.0, usual_curvature, (solver.nu + 1.0) / (solver.nu + 3.0))
-    curvatures, scatters = [], []
-    for piece, piece_sums, wave_terms in zip(solver.problem.pieces, sums, waves, strict=True):
-        ticks = np.where(is_quiet[piece_sums.columns], piece.record.ticks, 0.0)
-        curvature, scatter = _of_piece(
-            piece_sums, wave_terms.waves, ticks, state.variance[piece_sums.columns], usual_curvature[piece_sums.columns]
-        )
-        curvatures.append(curvature)
-        scatters.append(scatter)
-    normal = Normal(solver, State(state.point, curvatures, state.objective, ones))
-    count, total = len(normal.scale), np.diag(normal.prior_information)
-    for scatter, (_, info) in zip(scatters, normal.pieces, strict=True):
-        full = np.concatenate([normal.scale, np.ones(len(scatter) - count)])[: len(info)]
-        score = scatter[: len(info), : len(info)] * np.outer(full, full)
-        lift = np.eye(count, len(info))
-        if len(info) > count:
-            lift[:, count:] = -of_states(info[count:, count:], info[count:, :count]).T
-        total = total + lift @ score @ lift.T
-    return normal.information, total
-
-
-def _of_piece(
-    sums: PieceSums, waves: FloatArray | None, ticks: FloatArray, variance: FloatArray, usual_curvature: FloatArray
-) -> tuple[PieceSums, FloatArray]:
-    """The sums of a piece with the mean curvature for its information, and the variance of its score."""
-    assert waves is not None
-    info, scatter = np.zeros_like(sums.info), np.zeros(sums.info.shape[1:])
-    for c, square in enumerate(sums.info):
-        if ticks[c] == 0.0:
-            info[c] = usual_curvature[c] / variance[c] * square
-            scatter += info[c]
-            continue
-        series, mean_curvature, curvature = rounding(0.5 * ticks[c] / math.sqrt(variance[c]), HARMONICS, STEPS)
-        power = 0.5 * series**2
-        tick_information = np.einsum("m,mkp,mkq->pq", power, waves[c], waves[c])
-        scatter += (tick_information + (mean_curvature - power.sum()) * square) / variance[c]
-        info[c] = curvature / variance[c] * square
-    return replace(sums, info=info), scatter

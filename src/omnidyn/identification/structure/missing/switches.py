@@ -17,7 +17,7 @@ from omnidyn.identification.lack_of_fit import LOSS, Remedy
 from omnidyn.identification.ladder import STANDS
 from omnidyn.identification.methods import STUDENT, OutputError
 from omnidyn.identification.output_error.prepare import expand_keys, guesses
-from omnidyn.identification.output_error.problem.friction_laws import with_damping
+from omnidyn.identification.output_error.problem.bristles import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import EFFICIENCY, OFFSET_SHARE
 from omnidyn.identification.output_error.solve.solver import Solution
@@ -39,7 +39,7 @@ from omnidyn.identification.structure.missing.laws import (
 )
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key
-from omnidyn.model.known.told import holding
+from omnidyn.model.known.breakaway_levels import holding
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
 from omnidyn.model.robot import Prior, Robot

@@ -7,4 +7,5 @@ where the numbers lie), usual (what the usual messages say of a robot) and clock
 Read here and not by rosbags 0.11: an MCAP of 100 MB takes 105 MB/s of processor time, by rosbags 35 MB/s with nothing
 kept; of that file cut at two thirds two thirds of the messages are read, by rosbags none; a bomb of 15 kB takes
 rosbags 1.9 GB of memory, and is refused here before it is unpacked (`python3 dev.py bench big_bag`).
+definitions: message definitions.
 """

@@ -136,9 +136,9 @@ def _sewn(topics: Sequence[Clocked], notes: list[str]) -> list[Clocked]:
     cuts = [k for k in np.flatnonzero((steps < -SET_BACK) | (steps > SET_FORWARD)).tolist() if _is_set(receive, k)]
     for k in reversed(cuts):
         step = int(receive[k + 1] - receive[k])
-        way = "back" if step < 0 else "forward"
+        direction = "back" if step < 0 else "forward"
         notes.append(
-            f"the clock of the recorder was set {way} by {abs(step) / 1e9:.6g} s: what follows is taken to begin "
+            f"the clock of the recorder was set {direction} by {abs(step) / 1e9:.6g} s: what follows is taken to begin "
             f"{SEAM / 1e9:g} s later, behind a gap"
         )
         topics = [_moved(topic, int(order[k]), int(receive[k]), step) for topic in topics]

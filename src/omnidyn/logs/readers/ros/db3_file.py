@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from omnidyn.errors import InputError
-from omnidyn.logs.readers.recording import LeftOut
+from omnidyn.logs.readers.left_out import LeftOut
 from omnidyn.logs.readers.ros.messages import Connection, Message
 from omnidyn.logs.readers.ros.pack import Unpacker
 

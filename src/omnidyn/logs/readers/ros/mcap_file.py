@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from typing import BinaryIO
 
-from omnidyn.logs.readers.recording import LeftOut
+from omnidyn.logs.readers.left_out import LeftOut
 from omnidyn.logs.readers.ros.messages import Connection, Message
 from omnidyn.logs.readers.ros.pack import DamagedError, Unpacker
 

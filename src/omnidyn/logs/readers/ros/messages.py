@@ -14,17 +14,8 @@ from omnidyn.files import too_large
 from omnidyn.logs.readers.claims import TopicClaim, TopicColumn, tracks_of
 from omnidyn.logs.readers.recording import Topic, Track, topic_of
 from omnidyn.logs.readers.ros.clocks import Clocked, trusted
-from omnidyn.logs.readers.ros.layout import (
-    USUAL_TYPES,
-    BadDefinitionError,
-    BadMessageError,
-    MessageLayout,
-    Types,
-    column,
-    layout_of,
-    parse_definition,
-    plain,
-)
+from omnidyn.logs.readers.ros.definitions import USUAL_TYPES, BadDefinitionError, Types, parse_definition, plain
+from omnidyn.logs.readers.ros.layout import BadMessageError, MessageLayout, column, layout_of
 from omnidyn.logs.readers.ros.usual import NANOSECONDS, SECONDS, Rule, rank_of, rule_of
 from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY
 

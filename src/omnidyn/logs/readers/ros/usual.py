@@ -16,7 +16,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.readers.claims import TopicColumn
-from omnidyn.logs.readers.ros.layout import MessageLayout, plain
+from omnidyn.logs.readers.ros.definitions import plain
+from omnidyn.logs.readers.ros.layout import MessageLayout
 
 Picks = Mapping[str, str]  # key -> path of a number in the layout
 Numbers = Mapping[str, FloatArray]  # key -> one number a message
