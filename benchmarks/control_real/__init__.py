@@ -10,13 +10,23 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from benchmarks.control_real.paths import FunctionPath, paths
 from benchmarks.control_real.plant import Plant
-from benchmarks.control_real.rivals import DT, FRICTION_SHARE, LQR_GAIN, HandPid, KinematicPi, LqrIntegral, to_body
+from benchmarks.control_real.rivals import (
+    DT,
+    FRICTION_SHARE,
+    LQR_GAIN,
+    Behind,
+    HandPid,
+    KinematicPi,
+    LqrIntegral,
+    to_body,
+)
 from benchmarks.control_real.robots import NUMBERS, SLOWER, Numbers, random_numbers, robot_of
 from benchmarks.table import Table, machine
 from omnidyn.arrays import FloatArray
@@ -27,7 +37,24 @@ from omnidyn.model.robot import Robot
 
 SENSORS = ("instantaneous", "encoder", "camera", "jitter")
 POSE_NOISE, TWIST_NOISE = np.array([1e-3, 1e-3, 1e-3]), np.array([5e-3, 5e-3, 0.02])
-CAMERA_RATE, CAMERA_DELAY = 60.0, 0.04  # [Hz], [s]
+
+
+class Camera(NamedTuple):
+    """rate [Hz]; delay [s]; noise [m, m, rad] std of a pose, shape (3,)."""
+
+    rate: float
+    delay: float
+    noise: FloatArray
+
+
+CAMERAS = {
+    "camera": Camera(60.0, 0.04, POSE_NOISE),
+    "camera 1 mm": Camera(30.0, 0.06, np.array([1e-3, 1e-3, 2e-3])),
+    "camera 2 mm": Camera(30.0, 0.06, np.array([2e-3, 2e-3, 4e-3])),
+}
+POOLED = ("camera 1 mm", "camera 2 mm")  # of three seeds; rivals stand behind a filter there
+SEEDS = (0, 1, 2)
+MOST_LOST = {"pid": 0.15, "mpc": 0.05}  # share of the pooled cells
 JITTER, SKIP, ALLOWED = 2e-3, 0.5, 1.1  # [s], [s], times the best
 COUNTS = (0.05, 0.2)  # [mm], [mrad] a difference that counts
 OURS, RIVALS = ("pid", "mpc"), ("PID + kS", "LQR + I", "PI + FF")
@@ -35,14 +62,14 @@ COLUMNS = ("PID", "PID + kS", "LQR + I", "PI + FF", "pid", "mpc")
 
 
 class Instruments:
-    """What a controller is given in place of the truth. kind: one of SENSORS."""
+    """What a controller is given in place of the truth. kind: one of SENSORS, or of CAMERAS."""
 
     def __init__(self, kind: str, plant: Plant, seed: int) -> None:
         self.kind, self.plant, self._random = kind, plant, np.random.default_rng(seed)
         self._twist_of = np.linalg.pinv(plant.directions.T)
         self._angles, self._pose, self._t = plant.encoders(), plant.pose, plant.t
         self._frames = [(-math.inf, plant.pose)]
-        self._next = 0
+        self._next, self._camera = 0, CAMERAS.get(kind)
 
     def seen(self) -> tuple[FloatArray, FloatArray]:
         """(pose, twist) as measured now. Shapes (3,)."""
@@ -50,7 +77,7 @@ class Instruments:
         if self.kind in ("instantaneous", "jitter"):
             return self.plant.pose + POSE_NOISE * noise[:3], self.plant.twist + TWIST_NOISE * noise[3:]
         twist = self._counted()
-        if self.kind != "camera":
+        if self._camera is None:
             return self._pose.copy(), twist
         while self._frames and len(self._frames) > 1 and self._frames[1][0] <= self.plant.t + 1e-9:
             self._frames.pop(0)
@@ -72,11 +99,12 @@ class Instruments:
     def drive(self, output: FloatArray, seconds: float) -> None:
         """Let the plant go on; a camera takes its pictures meanwhile."""
         end = self.plant.t + seconds
-        if self.kind == "camera":
-            while self._next / CAMERA_RATE < end:
-                self._advance(output, self._next / CAMERA_RATE - self.plant.t)
-                pose = self.plant.pose + POSE_NOISE * self._random.standard_normal(3)
-                self._frames.append((self.plant.t + CAMERA_DELAY, pose))
+        if self._camera is not None:
+            rate, delay, noise = self._camera
+            while self._next / rate < end:
+                self._advance(output, self._next / rate - self.plant.t)
+                pose = self.plant.pose + noise * self._random.standard_normal(3)
+                self._frames.append((self.plant.t + delay, pose))
                 self._next += 1
         self._advance(output, end - self.plant.t)
 
@@ -87,16 +115,25 @@ class Instruments:
 
 def told(robot: Robot, kind: str) -> Robot:
     """The robot as its file says which sensors it has."""
-    sensors = {
-        "encoder": Sensors(twist="mean"),
-        "localised": Sensors(twist="mean"),
-        "camera": Sensors(twist="mean", pose_delay=CAMERA_DELAY, pose_rate=CAMERA_RATE),
-    }
-    return robot.replace(sensors=sensors.get(kind))
+    if kind in CAMERAS:
+        camera = CAMERAS[kind]
+        sensors = Sensors(twist="mean", pose_delay=camera.delay, pose_rate=camera.rate)
+        if kind in POOLED:
+            sensors = sensors.replace(pose_noise=float(camera.noise[0]), heading_noise=float(camera.noise[2]))
+        return robot.replace(sensors=sensors)
+    return robot.replace(sensors=Sensors(twist="mean") if kind in ("encoder", "localised") else None)
 
 
 def makers(name: str, numbers: Numbers, kind: str) -> dict[str, Callable[[Plant], Any]]:
     """Controller -> what makes it for a plant."""
+    made = _makers(name, numbers, kind)
+    if kind not in POOLED:
+        return made
+    delay = CAMERAS[kind].delay
+    return {key: make if key in OURS else partial(Behind, make, delay) for key, make in made.items() if key != "PID"}
+
+
+def _makers(name: str, numbers: Numbers, kind: str) -> dict[str, Callable[[Plant], Any]]:
     robot = told(robot_of(name, numbers), kind)
     ours: dict[str, Callable[[Plant], Any]] = {"pid": lambda plant: Pid(robot), "mpc": lambda plant: Mpc(robot)}
     if "loop" in numbers:
@@ -142,6 +179,17 @@ def errors(
     return float(rms[0]), float(rms[1]), 1e6 * float(np.median(took))
 
 
+def seeds_of(kind: str) -> tuple[int, ...]:
+    """Of the noise, whose runs are pooled."""
+    return SEEDS if kind in POOLED else SEEDS[:1]
+
+
+def pooled(runs: list[tuple[float, float, float]]) -> tuple[float, float, float]:
+    """Root of the mean squared errors of several runs, and the mean time of a step."""
+    position, heading = np.sqrt(np.mean(np.square([run[:2] for run in runs]), axis=0)).tolist()
+    return position, heading, float(np.mean([run[2] for run in runs]))
+
+
 def lost(cells: dict[str, tuple[float, float, float]]) -> list[tuple[str, str]]:
     """(controller, "mm" or "mrad") where one of ours is beaten."""
     found = []
@@ -158,26 +206,38 @@ def table_of(robots: dict[str, Numbers], names: list[str]) -> Table:
     """A row per robot, path and sensors."""
     columns = ["robot", "path", "sensors", *COLUMNS, "lost"]
     table = Table("control_real: rms of position mm / heading mrad on an independent plant", columns, notes=[machine()])
-    count = {name: 0 for name in OURS}
+    count, pooled_count = ({name: 0 for name in OURS} for _ in range(2))
     times: dict[str, list[float]] = {name: [] for name in OURS}
     for robot, numbers in robots.items():
         for name in names:
-            for kind in SENSORS:
+            for kind in (*SENSORS, *POOLED):
                 path, plant = paths(SLOWER.get(robot, 1.0))[name], Plant(numbers)
                 cells = {
-                    control: errors(plant, make(plant), path, kind)
+                    control: pooled([errors(plant, make(plant), path, kind, seed) for seed in seeds_of(kind)])
                     for control, make in makers(robot, numbers, kind).items()
                 }
                 beaten = lost(cells)
                 for control, _ in beaten:
-                    count[control] += 1
+                    (pooled_count if kind in POOLED else count)[control] += 1
                 for control in OURS:
                     times[control].append(cells[control][2])
                 words: dict[str, Any] = {name: "" for name in COLUMNS}
                 words |= {control: f"{cell[0]:.2f}/{cell[1]:.2f}" for control, cell in cells.items()}
                 words["lost"] = ", ".join(f"{control} {unit}" for control, unit in beaten)
                 table.add(robot=robot, path=name, sensors=kind, **words)
-    total = 2 * len(table.rows)
+    rows = len(table.rows)
+    total = 2 * rows * len(SENSORS) // (len(SENSORS) + len(POOLED))
+    pooled_total = 2 * rows - total
+    for control in OURS:
+        most = MOST_LOST[control]
+        table.add(
+            f"{100.0 * most:.0f} %",
+            pooled_count[control] <= most * pooled_total,
+            robot="all",
+            path=control,
+            sensors="cameras of 30 Hz",
+            lost=f"{pooled_count[control]} of {pooled_total}",
+        )
     for control in OURS:
         table.add(
             "0 cells",

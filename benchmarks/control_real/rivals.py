@@ -7,6 +7,7 @@ by hand for each robot and stay as they are.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -128,3 +129,35 @@ class LqrIntegral(Rival):
     def add(self, error: FloatArray) -> None:
         """The integral of the error."""
         self.sum = np.clip(self.sum + error * DT, -MOST_LQR_SUM, MOST_LQR_SUM)
+
+
+class Behind:
+    """A rival behind a filter of first order: speeds are added up, and a share of the error of each late pose.
+
+    make: makes the rival for a plant. delay [s]: age of a pose when it arrives.
+    """
+
+    SHARE, KEPT = 0.1, 12  # of a new error; places remembered
+
+    def __init__(self, make: Callable[[Plant], Any], delay: float, plant: Plant) -> None:
+        self.plant, self._rival, self._age = plant, make(plant), delay + 0.5 * DT
+        self._believed: FloatArray | None = None
+        self._seen, self._past = np.full(3, np.nan), list[tuple[float, FloatArray]]()
+
+    def step(self, t: float, pose: FloatArray, twist: FloatArray, path: Any) -> FloatArray:
+        """What the rival says of the pose that is believed."""
+        if self._believed is None:
+            self._believed = pose.copy()
+        believed = self._believed + to_body(self._believed[2] + 0.5 * DT * twist[2]).T @ twist * DT
+        self._past = [*self._past, (t, believed)][-self.KEPT :]
+        if (pose != self._seen).any():
+            times, places = (np.array(rows) for rows in zip(*self._past, strict=True))
+            then = np.array([np.interp(t - self._age, times, places[:, k]) for k in range(3)])
+            off = pose - then
+            off[2] = math.remainder(off[2], 2.0 * math.pi)
+            if not np.isnan(self._seen).any():
+                believed = believed + self.SHARE * off
+                self._past = [(time, place + self.SHARE * off) for time, place in self._past]
+            self._seen = pose.copy()
+        self._believed = believed
+        return self._rival.step(t, believed, twist, path)

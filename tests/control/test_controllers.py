@@ -27,10 +27,12 @@ from omnidyn.control.controllers import (
     several,
 )
 from omnidyn.control.feedforward import Feedforward
+from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import SpeedLoop
 from omnidyn.errors import InputError, Terminated
 from omnidyn.model.drive import Drive
+from omnidyn.model.log_effects import Sensors
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.live import LiveRobot
 from tests.support.friction_shapes import shaped
@@ -308,6 +310,19 @@ def test_names_files_and_what_they_do_without(tmp_path):
     assert controller_named(str(tmp_path / "own.toml"), AXEBOT, dt=0.01).faster == 1.5
 
 
+def test_two_files_of_one_controller_are_told_apart_by_their_names(tmp_path):
+    files = [tmp_path / "slow.toml", tmp_path / "other" / "slow.toml", tmp_path / "fast.toml"]
+    files[1].parent.mkdir()
+    for k, file in enumerate(files):
+        save_controller(ControllerFile("pid", {"faster": 1.0 + k}), file)
+    found = [str(file) for file in files]
+    assert [made.name for made in several(["pid", found[0], found[2]], AXEBOT)] == ["pid", "slow.toml", "fast.toml"]
+    assert [made.name for made in several(found, AXEBOT)] == [found[0], found[1], "fast.toml"]
+    assert [made.name for made in several([found[0]], AXEBOT)] == ["pid"]
+    tracked = omnidyn.track(AXEBOT, "circle", ["pid", files[2]], duration=0.2)
+    assert [tracking.controller for tracking in tracked] == ["pid", "fast.toml"]
+
+
 @pytest.mark.parametrize(
     "text, words",
     [
@@ -361,3 +376,19 @@ def test_the_law_of_pid_over_arrays_is_that_of_each_robot(name):
         assert effort.current[index] == pytest.approx(alone.current, rel=1e-12, abs=1e-12)
         _, met = pid.volts.within(alone)
         assert met == ("voltage",) * bool(volts[index]) + ("current",) * bool(current[index])
+
+
+def test_a_step_of_pid_costs_no_more_than_one_that_looks_ahead():
+    """On the median of many steps, its estimator included: it was ten times as much."""
+    robot = load_robot("lekiwi").replace(sensors=Sensors(twist="mean", pose_delay=0.06, pose_rate=30.0))
+    path, took = omnidyn.path("circle:radius_m=0.3,speed_m_s=0.1"), []
+    for control in (Pid(robot), Mpc(robot)):
+        motion = path.at(control.dt * np.arange(400))
+        for k in range(400):
+            control.step(k * control.dt, motion.pose[k], motion.velocity[k], path)
+        times = []
+        for k in range(400):
+            control.step((400 + k) * control.dt, motion.pose[k], motion.velocity[k], path)
+            times.append(control.info.time)
+        took.append(np.median(times))
+    assert took[0] < 1.5 * took[1]

@@ -51,6 +51,7 @@ def finely(steps=60, parts=200):
         "encoder:2048,pose",
         "encoder:1024,filter:30ms,pose:60Hz,40ms,dropouts:5%,jitter:2ms,missed:1%",
         "instantaneous,pose:40ms",
+        "encoder:512,gyro:5mrad/s,bias:4mrad/s,pose:30Hz,60ms,1mm,2mrad",
     ],
 )
 def test_a_text_is_read_and_said_again(text):
@@ -61,7 +62,7 @@ def test_a_text_is_read_and_said_again(text):
 
 def test_what_a_text_says_and_what_a_file_says():
     assert instruments("encoder:2048, pose:60Hz,0.04s, missed:2%", AXEBOT) == Instruments(
-        Sensors(twist="mean", pose_delay=0.04, pose_rate=60.0), counts=2048.0, missed=0.02
+        Sensors(twist="mean", pose_delay=0.04, pose_rate=60.0, encoder_counts=2048.0), missed=0.02
     )
     assert instruments("encoder:2048", AXEBOT).odometry
     sensors = Sensors(twist="mean", twist_filter=0.03, pose_delay=0.04)
@@ -75,7 +76,7 @@ def test_what_a_text_says_and_what_a_file_says():
         ("2048", "expected encoder:2048, pose:60Hz,40ms"),
         ("encoder:2048ms", "a number behind encoder"),
         ("encoder:0.5", "out of range"),
-        ("pose:60", "a number of Hz or a number of s behind pose"),
+        ("pose:60", "a number of Hz or a number of s or .* behind pose"),
         ("pose:2s", r"out of range; got pose:2s; expected 0 to 1"),
         ("jitter", "a value behind it, such as jitter:5ms"),
         ("dropouts:99%", "out of range"),

@@ -12,10 +12,11 @@ from benchmarks.control_real.paths import paths
 from benchmarks.control_real.plant import Plant
 from benchmarks.control_real.robots import NUMBERS, robot_of
 from omnidyn.control.controllers import controller_named
-from omnidyn.control.late_pose import LatePose
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.mpc.model import DECAY, LINEAR_SIZE, PHI, PSI, STEP, held_for, numbers
 from omnidyn.control.pid import Pid
+from omnidyn.control.pid_batch import PidBatch
+from omnidyn.control.pose_estimator import pose_estimator
 from omnidyn.export.code.c_controller import c_controller
 from omnidyn.export.ros.node import ros2_node
 from omnidyn.model.log_effects import Lateness, LogEffects, Sensors
@@ -56,14 +57,84 @@ def test_a_pose_that_is_late_is_moved_by_what_was_counted_since():
             [radius * (math.sin(angle) - math.sin(0.3)), -radius * (math.cos(angle) - math.cos(0.3)), angle]
         )
 
-    bridge, twist, found = LatePose(age, averaged=True), np.array([speed, 0.0, omega]), np.zeros(3)
+    bridge = estimator(Sensors(twist="mean", pose_delay=age))
+    twist, found = np.array([speed, 0.0, omega]), np.zeros(3)
     for k in range(20):
-        found = bridge.now(k * dt, place(k * dt - age), twist)
+        found = believed(bridge, k * dt, place(k * dt - age), twist)
     np.testing.assert_allclose(found, place(19 * dt), atol=5e-5)
     frozen = place(19 * dt - age)
     for k in range(20, 24):  # what comes again as it was only grows older
-        found = bridge.now(k * dt, frozen, twist)
+        found = believed(bridge, k * dt, frozen, twist)
     np.testing.assert_allclose(found, place(23 * dt), atol=5e-5)
+
+
+def estimator(sensors):
+    """That of the axebot with these sensors."""
+    made = pose_estimator(AXEBOT.replace(sensors=sensors), 0.02)
+    assert made is not None
+    return made
+
+
+def believed(bridge, t, pose, twist):
+    """The pose that an estimator makes of a measured one."""
+    state = np.array([*pose, *twist], dtype=float)
+    bridge.estimate(t, state)
+    return state[:3]
+
+
+@pytest.mark.parametrize("noise", [1e-3, 4e-3])
+@pytest.mark.parametrize("off", [0.0, 0.01])
+def test_noise_of_poses_is_averaged_and_wheels_of_another_size_are_followed(noise, off):
+    """Straight on at 0.4 m/s, twists `off` too large: the gain g that makes u/g and s sqrt(g/2) least together."""
+    dt, speed, random = 0.02, 0.4, np.random.default_rng(1)
+    bridge = estimator(Sensors(twist="mean", pose_delay=0.06, pose_noise=noise, heading_noise=2.0 * noise))
+    errors = []
+    for k in range(2000):
+        t = k * dt
+        pose = [speed * max(t - 0.06, 0.0), 0.0, 0.0] + noise * np.array([1.0, 1.0, 2.0]) * random.standard_normal(3)
+        found = believed(bridge, t, pose, [(1.0 + off) * speed if k else 0.0, 0.0, 0.0])
+        errors.append(found - [speed * t, 0.0, 0.0])
+    rms = np.sqrt(np.mean(np.square(errors[200:]), axis=0))
+    gain = (2.0 * (3e-3 * speed + 1e-4) * dt / noise) ** (2.0 / 3.0)
+    assert rms[1] < 1.3 * noise * math.sqrt(gain / 2.0)
+    assert rms[2] < noise
+    late = off * speed * 0.06  # what wheels of another size count while a pose is on its way
+    assert rms[0] < 1.3 * math.hypot(off * speed * dt / gain + late, noise * math.sqrt(gain / 2.0))
+
+
+def test_a_robot_that_was_carried_away_is_believed_where_it_is():
+    bridge = estimator(Sensors(twist="mean", pose_delay=0.04))
+    for k in range(50):
+        believed(bridge, 0.02 * k, [1e-4 * (k % 2), 0.0, 0.0], np.zeros(3))
+    np.testing.assert_array_equal(believed(bridge, 1.0, [0.5, 0.1, 3.0], np.zeros(3)), [0.5, 0.1, 3.0])
+
+
+@pytest.mark.parametrize("make", [Pid, Mpc])
+@pytest.mark.parametrize("kind", ["encoder", "camera"])
+def test_a_fit_of_late_poses_drives_on_encoders_and_on_a_camera(make, kind):
+    """[log.latency] says how late poses of the log were; nobody says what feeds the loop: 18 mm and more, it was."""
+    plant, along, fit = Plant(NUMBERS["axebot"]), paths()["clover"], robot_of("axebot", NUMBERS["axebot"])
+    known = errors(plant, make(told(fit, kind)), along, kind)
+    age = 0.04 + 0.5 / 60.0  # of the camera, and the mean time that a frame waits for a step
+    late = Lateness(position=age, heading=age, wheel_angle=0.0)
+    fitted = errors(plant, make(fit.replace(log=LogEffects(latency=late))), along, kind)
+    for own, true, least in zip(fitted[:2], known, (0.05, 0.2), strict=False):
+        assert own < 1.2 * true + least
+
+
+@pytest.mark.parametrize("kind", ["pid", "mpc"])
+def test_many_robots_with_late_poses_are_one_each(kind):
+    robot = AXEBOT.replace(sensors=Sensors(twist="mean", pose_delay=0.05, pose_rate=30.0, encoder_counts=2048))
+    follow, random = omnidyn.path("eight"), np.random.default_rng(0)
+    one: Any = Pid(robot) if kind == "pid" else Mpc(robot)
+    many: Any = PidBatch(one, 2) if kind == "pid" else Mpc(robot).batch(2)
+    for k in range(60):
+        t = 0.02 * k
+        pose = follow.at(math.floor((t - 0.05) * 30.0) / 30.0).pose + 1e-3 * random.standard_normal(3)
+        twist = follow.twist_at(t)[1]
+        sent = one.step(t, pose, twist, follow)
+        both = many.step_batch(t, np.stack([np.zeros(3), pose]), np.stack([np.zeros(3), twist]), follow)
+        np.testing.assert_allclose(both[1], sent, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(4))

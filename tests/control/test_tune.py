@@ -96,8 +96,7 @@ def test_an_mpc_begins_with_what_follows_from_its_robot_and_its_sensors():
     assert found.sensors == "encoder:2048,pose:60Hz,40ms"
     assert found.start["pose"] == POSE
     assert found.start["horizon"] == 20
-    late = AXEBOT.replace(sensors=tuning.instruments(found.sensors, AXEBOT).sensors)
-    assert found.start["pose_noise"] == Settings().of(late).pose_noise != Settings().of(AXEBOT).pose_noise
+    assert found.start["pose_noise"] == (1e-3, 1e-3, 2e-3) != Settings().of(AXEBOT, 0.02).pose_noise
     assert set(found.gains) == set(tuning.TUNED["mpc"])
 
 

@@ -25,7 +25,7 @@ SENSORS = typer.Option(
     "",
     "--sensors",
     metavar="SPEC",
-    help="encoder:2048, filter:30ms, pose:60Hz,40ms, dropouts:5%, jitter:2ms, missed:1%; default: [sensors].",
+    help="encoder:2048, gyro:5mrad/s, filter:30ms, pose:60Hz,40ms,1mm, dropouts:5%, jitter:2ms; default: [sensors].",
 )
 
 

@@ -150,7 +150,7 @@ def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by
     if not wanted:
         raise InputError("no controller", got="an empty list", expected="one controller or more", where="controller")
     options = {"supply": supply, **told_of_loop(believed, around)}
-    controllers = told_apart([_controller(entry, believed, options) for entry in wanted])
+    controllers = told_apart([_controller(entry, believed, options) for entry in wanted], wanted)
     trackings = [tracked(plant or robot, follow, follower, around, progress) for follower in controllers]
     return Trackings(tuple(trackings)) if isinstance(controller, list | tuple) else trackings[0]
 
@@ -197,7 +197,7 @@ def tracked(
     early = round(plant.drive.latency / dt) + around.delay
     draws = np.random.default_rng(around.seed).standard_normal((count + early, 6))
     lost = random.random(count + early) < kit.dropouts
-    readings = Readings(kit, live, -early * dt, around.noise * NOISE, controller.robot.wheels)
+    readings = Readings(kit, live, -early * dt, around.noise * NOISE, controller.robot.wheels, random)
     sent, volts, state = np.empty((count, n)), np.empty((count, n)), np.empty((count + 1, 6 + n))
     for k in range(-early, 0):  # it waits where the path begins; what is sent now acts when it does
         live.step(controller.step(k * dt, *readings.seen(draws[k], bool(lost[k])), path))

@@ -34,8 +34,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.control.filtered_twist import FilteredTwist, filtered_twist
-from omnidyn.control.late_pose import LatePose, late_pose
 from omnidyn.control.paths.adapter import as_path
+from omnidyn.control.pose_estimator import PoseEstimator, pose_estimator
 from omnidyn.control.pose_gate import JUMPED, REPEATED, SLIPPED, PoseGate
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.drive import DUTY, SPEED
@@ -56,6 +56,7 @@ DOUBTS = {
     SLIPPED: "twist disagrees with poses: corrected",
     REPEATED: "measurement repeated: moved on",
 }
+SWINGS = "swings: correct latency_s of [drive], or lower the gains"
 MOST_BRIDGED = 2  # measurements missing in a row
 LATEST = 1.5  # steps after the one before: what comes later is not gone on from
 MOST_SUPPLY = 1e4  # [V]
@@ -82,7 +83,7 @@ class Info:
     @property
     def ok(self) -> bool:
         """Whether the output is what the controller wanted to send: for a path that ended or a doubtful state, too."""
-        return self.status in (OK, PATH_ENDED, *DOUBTS.values())
+        return self.status in (OK, PATH_ENDED, SWINGS, *DOUBTS.values())
 
 
 class Followed(Protocol):
@@ -151,6 +152,7 @@ class Safe:
     name = "controller"
     dt: float  # [s] between two steps
     _filtered_twist: FilteredTwist | None = None
+    _swinging = False
 
     def __init__(self, robot: Robot, supply: float | None = None) -> None:
         self.supply = supply
@@ -215,8 +217,12 @@ class Safe:
         self._missing = 0
         try:
             demand, limits = output(dt)
-            sent = np.clip(demand, -self.limit, self.limit)
-            fine = sent.shape == self.limit.shape and bool(np.isfinite(sent).all())
+            sent, largest = demand, self.limit
+            if sent.shape != largest.shape or not (abs(sent) <= largest).all():
+                sent = np.clip(demand, -largest, largest)
+                fine = sent.shape == largest.shape and bool(np.isfinite(sent).all())
+            else:
+                fine = True
         except Exception as raised:  # the loop of a robot must not end here, but where a user ends it
             error = told_by(raised)
             if isinstance(error, INTERRUPTS):
@@ -225,6 +231,8 @@ class Safe:
         if not fine:
             return self._safe(FAILED, start)
         self._last = sent
+        if self._swinging and status in (OK, PATH_ENDED):
+            status = SWINGS
         self.info = Info(status, time=time.perf_counter() - start, limits=limits)
         return sent.copy()
 
@@ -254,19 +262,19 @@ class Safe:
 class Guarded(Safe, ABC):
     """A controller whose steps are checked before and after it sees them; subclasses write `_output`."""
 
-    _late_pose: LatePose | None = None
+    _estimator: PoseEstimator | None = None
     _gate: PoseGate
 
     def _take(self, robot: Robot) -> None:
         super()._take(robot)
-        self._late_pose = late_pose(robot, self.dt, self._late_pose)
+        self._estimator = pose_estimator(robot, self.dt, self._estimator)
         self._gate = PoseGate(robot, self.dt, vars(self).get("_gate"))
 
     def reset(self) -> None:
         """Forget all steps."""
         super().reset()
-        if self._late_pose is not None:
-            self._late_pose.reset()
+        if self._estimator is not None:
+            self._estimator.reset()
         self._gate.reset()
 
     def step(self, t: float, pose: Any, twist: Any, path: Any, supply: float | None = None) -> FloatArray:
@@ -283,9 +291,9 @@ class Guarded(Safe, ABC):
             return self._guarded(t, word, "", None)
         status = PATH_ENDED if _ended(follow, t) else OK
         if math.isfinite(now := _number(t)):
-            if self._late_pose is not None:
-                place = self._late_pose.now(now, place, speed)
             state = np.concatenate([place, speed])
+            if self._estimator is not None:
+                self._estimator.estimate(now, state)
             status = DOUBTS.get(self._gate.judge(now, state), status)
             place, speed = state[:3], state[3:]
         return self._guarded(t, "", status, lambda dt: self._output(float(t), dt, place, speed, follow))

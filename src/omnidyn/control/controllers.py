@@ -163,7 +163,7 @@ def several(
     """Controllers for one robot, each by name or file; "pid_no_friction" and "mpc_no_observer" are names too.
 
     no_friction: none of them knows of dry friction, or has an observer; no_observer: none has an observer. Two of one
-    name are told apart by a number. Raises InputError where an option given is none of any of them.
+    name are told apart by their files, else by a number. Raises InputError where no controller has an option given.
     """
     specs = [_spec(name, no_friction, no_observer) for name in names]
     keys = [*(key for key in options if key not in OF_THE_CALL), *(["observer"] if no_observer else [])]
@@ -175,15 +175,28 @@ def several(
                 expected=f"one with the option {key}",
                 where=f"no_{key}" if key == "observer" else key,
             )
-    return told_apart([spec.make(robot, **options) for spec in specs])
+    return told_apart([spec.make(robot, **options) for spec in specs], names)
 
 
-def told_apart(controllers: list[Controller]) -> list[Controller]:
-    """The controllers, two of one name told apart by a number."""
+def told_apart(controllers: list[Controller], sources: Sequence[Any]) -> list[Controller]:
+    """The controllers, those of one name told apart by the file they come from, else by a number.
+
+    sources: what each was made of, a name or a path of a file among them.
+    """
+    names = [controller.name for controller in controllers]
+    paths = [os.fspath(source) if isinstance(source, str | os.PathLike) else "" for source in sources]
+    paths = [path if path.endswith((".toml", POLICY_SUFFIX)) else "" for path in paths]
+    short = [os.path.basename(path) for path in paths]
+    taken = list[str]()
     for k, controller in enumerate(controllers):
-        before = sum(earlier.name.partition(" ")[0] == controller.name for earlier in controllers[:k])
-        if before and controller not in controllers[:k]:
-            controller.name = f"{controller.name} {before + 1}"  # pyright: ignore[reportAttributeAccessIssue]
+        if controller in controllers[:k]:
+            continue
+        name = names[k]
+        if paths[k] and names.count(name) > 1:
+            name = paths[k] if len({path for path in paths if os.path.basename(path) == short[k]}) > 1 else short[k]
+        before = sum(other.partition(" ")[0] == name for other in taken)
+        taken.append(f"{name} {before + 1}" if before else name)
+        controller.name = taken[-1]  # pyright: ignore[reportAttributeAccessIssue]
     return controllers
 
 

@@ -1,10 +1,11 @@
 """Instruments: with what a simulated robot is measured in a loop, and how steadily that loop runs; as one text.
 
-    encoder:2048,filter:30ms,pose:60Hz,40ms,dropouts:5%,jitter:2ms,missed:1%
+    encoder:2048,gyro:5mrad/s,bias:4mrad/s,filter:30ms,pose:60Hz,40ms,1mm,2mrad,dropouts:5%,jitter:2ms,missed:1%
 
 Parts in any order, those left out being off: `encoder` (speeds are differences of counts of each wheel, 2048 in a turn;
-the pose is what they add up to), `instantaneous`, `filter` (a low pass behind the speeds), `pose` (measured from
-outside, new so often and so late), `dropouts` (samples lost), `jitter` (of the time between two steps, either way) and
+the pose is what they add up to), `gyro` and `bias` (omega is that of a gyroscope: std of a sample, and of what it shows
+at rest), `instantaneous`, `filter` (a low pass behind the speeds), `pose` (measured from outside, new so often, so
+late, with so much noise), `dropouts` (samples lost), `jitter` (of the time between two steps, either way) and
 `missed` (steps in which the loop does not come: the output before holds on).
 """
 
@@ -22,25 +23,45 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.frames import body_to_world, world_to_body
-from omnidyn.model.log_effects import FASTEST, INSTANTANEOUS, LATEST_POSE, MEAN, SLOWEST_FILTER, Sensors
+from omnidyn.model.log_effects import (
+    FASTEST,
+    INSTANTANEOUS,
+    LATEST_POSE,
+    MEAN,
+    MOST_BIAS,
+    MOST_COUNTS,
+    NOISIEST,
+    SLOWEST_FILTER,
+    Sensors,
+)
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import Wheels, twist_from_wheel_speed, wheel_speed
 from omnidyn.simulation.live import LiveRobot
 
-MOST_COUNTS, MOST_JITTER, MOST_LOST = 1e7, 0.5, 0.9  # in a turn, of a step, of samples and of steps
-SIZES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "Hz": 1.0, "%": 0.01, "": 1.0}
+MOST_JITTER, MOST_LOST = 0.5, 0.9  # of a step, of samples and of steps
+# Unit of a value -> (the same in SI, how many of these it is).
+UNITS = {unit: (unit, 1.0) for unit in ("s", "Hz", "m", "rad", "rad/s", "")} | {
+    **{"ms": ("s", 1e-3), "us": ("s", 1e-6), "mm": ("m", 1e-3), "%": ("%", 0.01)},
+    **{"mrad": ("rad", 1e-3), "mrad/s": ("rad/s", 1e-3)},
+}
 # Word of a part -> unit of each of its values -> what that value is called here.
 PARTS: dict[str, dict[str, str]] = {
     INSTANTANEOUS: {},
-    "encoder": {"": "counts"},
+    "encoder": {"": "encoder_counts"},
+    "gyro": {"rad/s": "gyro_noise"},
+    "bias": {"rad/s": "gyro_bias"},
     "filter": {"s": "twist_filter"},
-    "pose": {"Hz": "pose_rate", "s": "pose_delay"},
+    "pose": {"Hz": "pose_rate", "s": "pose_delay", "m": "pose_noise", "rad": "heading_noise"},
     "dropouts": {"%": "dropouts"},
     "jitter": {"s": "jitter"},
     "missed": {"%": "missed"},
 }
 RANGES = {
-    "counts": (1.0, MOST_COUNTS),
+    "encoder_counts": (1.0, MOST_COUNTS),
+    "gyro_noise": (0.0, NOISIEST),
+    "gyro_bias": (0.0, MOST_BIAS),
+    "pose_noise": (0.0, NOISIEST),
+    "heading_noise": (0.0, NOISIEST),
     "twist_filter": (0.0, SLOWEST_FILTER),
     "pose_rate": (0.1, FASTEST),
     "pose_delay": (0.0, LATEST_POSE),
@@ -48,21 +69,20 @@ RANGES = {
     "jitter": (0.0, 10.0),
     "missed": (0.0, MOST_LOST),
 }
-_VALUE = re.compile(r"(\d+(?:\.\d*)?(?:e[+-]?\d+)?)\s*(s|ms|us|Hz|%|)", re.ASCII | re.IGNORECASE)
-_UNITS = {unit.lower(): unit for unit in SIZES}
+_VALUE = re.compile(rf"(\d+(?:\.\d*)?(?:e[+-]?\d+)?)\s*({'|'.join(UNITS)})", re.ASCII | re.IGNORECASE)
+_SPELLED = {unit.lower(): unit for unit in UNITS}
+OF_SENSORS = ("twist_filter", "encoder_counts", "gyro_noise", "gyro_bias", *PARTS["pose"].values())
 
 
 @dataclass(frozen=True)
 class Instruments:
-    """With what a robot is measured. sensors: what its speeds and poses are, which a controller may know.
-
-    counts: of an encoder in a turn of its wheel, None: not rounded. odometry: whether poses are counted and not seen
+    """With what a robot is measured. sensors: what its speeds and poses are, which a controller may know; counts that
+    nobody says are not rounded. odometry: whether poses are counted and not seen
     from outside. dropouts: share of the samples that are lost, NaN. jitter [s]: by which a step is longer or shorter
     at the most. missed: share of the steps that do not happen.
     """
 
     sensors: Sensors = field(default_factory=Sensors)
-    counts: float | None = None
     odometry: bool = False
     dropouts: float = 0.0
     jitter: float = 0.0
@@ -71,12 +91,17 @@ class Instruments:
     def __str__(self) -> str:
         """The text that says so."""
         sensors = self.sensors
-        words = ["encoder" if self.counts is None else f"encoder:{self.counts:.10g}"]
+        counts = sensors.encoder_counts
+        words = ["encoder" if counts is None else f"encoder:{counts:.10g}"]
         if sensors.twist == INSTANTANEOUS:
             words = [INSTANTANEOUS]
+        for name, value in (("gyro", sensors.gyro_noise), ("bias", sensors.gyro_bias)):
+            words += [] if value is None else [f"{name}:{1e3 * value:.10g}mrad/s"]
         words += [f"filter:{1e3 * sensors.twist_filter:.10g}ms"] if sensors.twist_filter else []
         rate, delay = sensors.pose_rate, sensors.pose_delay
         values = ([] if rate is None else [f"{rate:.10g}Hz"]) + ([f"{1e3 * delay:.10g}ms"] if delay else [])
+        for unit, value in (("mm", sensors.pose_noise), ("mrad", sensors.heading_noise)):
+            values += [] if value is None else [f"{1e3 * value:.10g}{unit}"]
         if values or (sensors.twist == MEAN and not self.odometry):
             words.append(":".join(["pose", *([",".join(values)] if values else [])]))
         for name, size, unit in (("dropouts", 0.01, "%"), ("jitter", 1e-3, "ms"), ("missed", 0.01, "%")):
@@ -126,15 +151,16 @@ def _read(text: str) -> Instruments:
         values[name] = number
     if INSTANTANEOUS in words and "encoder" in words:
         raise _unreadable(text, "speeds of the instant or of an encoder, not both")
-    for needed in ("filter", "dropouts", "jitter", "missed"):
+    for needed in ("gyro", "bias", "filter", "dropouts", "jitter", "missed"):
         if needed in words and not values.keys() & PARTS[needed].values():
-            raise _unreadable(needed, f"a value behind it, such as {needed}:{'2%' if '%' in PARTS[needed] else '5ms'}")
+            example = {"%": "2%", "s": "5ms", "rad/s": "5mrad/s"}[next(iter(PARTS[needed]))]
+            raise _unreadable(needed, f"a value behind it, such as {needed}:{example}")
     encoder = "encoder" in words
     sensors = Sensors(
         twist=MEAN if encoder else INSTANTANEOUS,
-        **{name: values[name] for name in ("twist_filter", "pose_delay", "pose_rate") if name in values},
+        **{name: values[name] for name in OF_SENSORS if name in values},
     )
-    rest = {name: values[name] for name in ("counts", "dropouts", "jitter", "missed") if name in values}
+    rest = {name: values[name] for name in ("dropouts", "jitter", "missed") if name in values}
     return Instruments(sensors, odometry=encoder and "pose" not in words, **rest)
 
 
@@ -150,14 +176,13 @@ def _value(word: str, text: str) -> tuple[str, float]:
     """(what a value of a part is, in SI)."""
     units = PARTS.get(word, {})
     match = _VALUE.fullmatch(text)
-    unit = _UNITS[match[2].lower()] if match else None
-    kind = "s" if unit in ("ms", "us") else unit
-    if match is None or unit is None or kind not in units:
+    kind, size = UNITS[_SPELLED[match[2].lower()]] if match else ("", 1.0)
+    if match is None or kind not in units:
         wanted = " or ".join(f"a number of {name}" if name else "a number" for name in units) or "no value"
         raise _unreadable(f"{word}:{text}", f"{wanted} behind {word}" if word else "encoder:2048, pose:60Hz,40ms")
-    name, number = units[kind], float(match[1]) * SIZES[unit]
+    name, number = units[kind], float(match[1]) * size
     low, high = RANGES[name]
-    if not low <= number <= high or (name == "counts" and number != round(number)):
+    if not low <= number <= high or (name == "encoder_counts" and number != round(number)):
         raise InputError("out of range", got=f"{word}:{text}", expected=f"{low:g} to {high:g} [SI]", where="sensors")
     return name, number
 
@@ -186,14 +211,28 @@ class Readings:
         start: the time now [s].
         noise: std of what no encoder counts, before a filter, shape (6,).
         believed: wheels by whose size and place counts become a twist; those of the robot by default.
+        random: draws what a gyroscope is off by.
     """
 
     def __init__(
-        self, kit: Instruments, live: LiveRobot, start: float, noise: FloatArray, believed: Wheels | None = None
+        self,
+        kit: Instruments,
+        live: LiveRobot,
+        start: float,
+        noise: FloatArray,
+        believed: Wheels | None = None,
+        random: np.random.Generator | None = None,
     ) -> None:
-        self._kit, self._live, self._noise = kit, live, noise
+        sensors = kit.sensors
+        in_file = np.array([sensors.pose_noise or 0.0] * 2 + [sensors.heading_noise or 0.0, 0.0, 0.0, 0.0])
+        self._kit, self._live, self._noise = kit, live, np.hypot(noise, in_file)
+        self._random = random or np.random.default_rng(0)
+        self._bias = (
+            (sensors.gyro_bias or 0.0) * float(self._random.standard_normal()) if sensors.has_gyroscope else 0.0
+        )
         self._wheels, self._believed = live.robot.wheels, believed or live.robot.wheels
-        self._turn = None if kit.counts is None else 2.0 * math.pi / kit.counts  # [rad] of a count
+        counts = sensors.encoder_counts
+        self._turn = None if counts is None else 2.0 * math.pi / counts  # [rad] of a count
         self._angles = self._counted = np.zeros(self._wheels.count)
         self._slipping = live.wheel_speed - wheel_speed(self._wheels, live.twist)
         self._seconds, self._moments = 0.0, deque([self._moment(start)])
@@ -216,9 +255,14 @@ class Readings:
         self._slipping, self._seconds = slipping, seconds
         counted = self._angles if self._turn is None else np.floor(self._angles / self._turn) * self._turn
         way = twist_from_wheel_speed(self._believed, counted - self._counted)
+        if self._kit.sensors.has_gyroscope:
+            drawn = (self._kit.sensors.gyro_noise or 0.0) * float(self._random.standard_normal())
+            way[2] = turned + seconds * (self._bias + drawn)
         self._counted_pose = self._counted_pose + body_to_world(self._counted_pose[2] + 0.5 * way[2]) @ way
         self._counted = counted
         self._twist = way / seconds if self._kit.sensors.twist == MEAN else np.array(self._live.twist)
+        if self._kit.sensors.has_gyroscope:
+            self._twist[2] = way[2] / seconds
         self._moments.append(now)
         oldest = now.t - self._kit.sensors.pose_delay - 1.0 / (self._kit.sensors.pose_rate or math.inf)
         while len(self._moments) > 2 and self._moments[1].t <= oldest:
@@ -238,7 +282,7 @@ class Readings:
     def seen(self, draw: FloatArray, lost: bool) -> tuple[FloatArray, FloatArray]:
         """(pose, twist) as a controller gets them, shapes (3,). draw (6,): of the noise, std 1. lost: NaN."""
         kit, noise = self._kit, self._noise * draw
-        self._shown = self._filtered(self._twist if kit.counts is not None else self._twist + noise[3:])
+        self._shown = self._filtered(self._twist if self._turn is not None else self._twist + noise[3:])
         pose = self._counted_pose if kit.odometry else self._pose(noise[:3])
         return (np.full(3, np.nan), np.full(3, np.nan)) if lost else (pose, self._shown)
 

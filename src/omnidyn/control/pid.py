@@ -17,13 +17,16 @@ LoopCommands). p, q: what the fast and the slow pole leave of an error in a step
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray, product
+from omnidyn.compiled.trace import scalar_function
 from omnidyn.control.controller import WHEEL_SPEED, Guarded
 from omnidyn.control.feedforward import DT, LoopCommands, Volts, check_delay, check_dt, lateness
+from omnidyn.control.paths.ahead import Ahead
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.speed_loop import (
     MOST_STEPS,
@@ -34,12 +37,16 @@ from omnidyn.control.speed_loop import (
     pole_rate,
     pose_gains,
 )
+from omnidyn.control.swing import Swing
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.inverse import Effort
 from omnidyn.model.robot import Robot
 
 FASTER, INTEGRAL = 3.0, 0.25
 CALM = 0.5  # of the fastest pole: that of a speed loop, whose commands show the noise of poses as it is
+
+
+Three = tuple[float, float, float]
 
 
 class Aim(NamedTuple):
@@ -87,20 +94,44 @@ class Pid(Guarded):
     def _take(self, robot: Robot) -> None:
         super()._take(robot)
         self.late = lateness(robot, self.delay, self.dt)
+        self._swing = Swing(robot, self.dt)
+        self._ahead = Ahead(self.dt, self.late, vars(self).get("_ahead"))
         if self.output == WHEEL_SPEED:
             self.commands = LoopCommands(robot, self.dt, self.friction)
             self.volts = self.commands.volts
             rates = np.minimum(self.volts.held.rates, CALM * SWIFT / (FASTER * self.dt))
             self.gains = place_gains(rates, self.faster, self.integral, self.dt, self.late)
-            return
-        self.volts = Volts(robot, self.dt, self.friction)
-        self.gains = pose_gains(self.volts.held.rates, self.faster, self.integral, self.dt, self.late)
-        self.home = 0.5 * pole_rate(self.volts.held.rates, self.faster, self.dt, self.late)
+        else:
+            self.volts = Volts(robot, self.dt, self.friction)
+            self.gains = pose_gains(self.volts.held.rates, self.faster, self.integral, self.dt, self.late)
+            self.home = 0.5 * pole_rate(self.volts.held.rates, self.faster, self.dt, self.late)
+        self._limits = tuple((self.volts if self.output != WHEEL_SPEED else self.commands).limit.tolist())
+        self._current_limits = tuple(self.volts.current_limit.tolist())
+        self._law = _in_numbers(*self.law())
+
+    def law(self) -> tuple[dict[str, tuple[int, ...]], Callable[..., dict[str, Any]]]:
+        """What a step works out: shapes of its arguments by name, and the function of them, arrays by name."""
+        if self.output == WHEEL_SPEED:
+            shapes = {"off": (3,), "heading": (), "velocity": (3, 3), "total": (3,), "share": (), "now": (3,)}
+            return shapes | {"loop": (self.robot.wheels.count,)}, self._commands
+        return {"off": (3,), "heading": (), "twist": (3,), "velocity": (3, 3), "total": (3,)}, self._volts
+
+    def _volts(self, off: Any, heading: Any, twist: Any, velocity: Any, total: Any) -> dict[str, Any]:
+        effort = self.effort(self.aim(off, heading, twist, velocity), total)
+        return {"output": effort.voltage, "current": effort.current}
+
+    def _commands(
+        self, off: Any, heading: Any, velocity: Any, total: Any, share: Any, now: Any, loop: Any
+    ) -> dict[str, Any]:
+        then = self.wanted(off, heading, velocity, total) / share
+        sent, mean, volts = self.commands.command(now, then, loop)
+        return {"output": sent, "mean": mean, "volts": volts, "then": then}
 
     def reset(self) -> None:
         """Forget all steps."""
         super().reset()
-        self._sum = np.zeros(3)
+        self._sum = (0.0, 0.0, 0.0)
+        self._swing.reset()
         self._forget_loop()
 
     def _safe(self, word: str, start: float) -> FloatArray:
@@ -110,51 +141,71 @@ class Pid(Guarded):
 
     def _forget_loop(self) -> None:
         """What is remembered of a speed loop: its sum [rad], mean speeds of the wheels asked for, the last twist."""
-        self._loop_sum = self._mean = self._zeros.copy()
-        self._reached: FloatArray | None = None
+        self._loop_sum = self._mean = (0.0,) * len(self._zeros)
+        self._reached: tuple[float, ...] | None = None
 
     def _output(
         self, t: float, dt: float, pose: FloatArray, twist: FloatArray, path: Path
     ) -> tuple[FloatArray, tuple[str, ...]]:
-        motion = path.at(np.array([t, t + self.late, t + self.late + self.dt]))
-        off = motion.pose[0] - pose
-        off[2] = math.remainder(off[2], 2.0 * math.pi)
+        place, velocity = self._ahead.at(t, path)
+        x, y, heading = pose.tolist()
+        vx, vy, omega = speed = tuple(twist.tolist())
+        cos, sin, (east, north) = math.cos(heading), math.sin(heading), velocity[:2]
+        self._swinging = self._swing.found(
+            t, vx - cos * east - sin * north, vy + sin * east - cos * north, omega - velocity[2]
+        )
+        off = place[0] - x, place[1] - y, math.remainder(place[2] - heading, 2.0 * math.pi)
         dt = min(dt, MOST_STEPS * self.dt)
-        raised_sum = self._sum + off * dt
+        sum_x, sum_y, sum_heading = self._sum
+        raised_sum = sum_x + off[0] * dt, sum_y + off[1] * dt, sum_heading + off[2] * dt
         if self.output == WHEEL_SPEED:
-            return self._commanded(dt, off, pose[2], twist, motion.velocity, raised_sum)
-        aim = self.aim(off, pose[2], twist, motion.velocity)
+            return self._commanded(dt, off, heading, speed, velocity, raised_sum)
+        count = len(self._zeros)
         for total in (raised_sum, self._sum):  # at a limit, nothing is added to the sum
-            sent, met = self.volts.within(self.effort(aim, total))
-            if not met and np.isfinite(sent).all():
+            found = self._law(off, heading, speed, velocity, total)
+            sent, met = self._within(found[:count], found[count:])
+            if not met and math.isfinite(sum(sent)):
                 self._sum = total
                 break
-        return self._sent(sent), met
+        return self._sent(np.array(sent)), met
+
+    def _within(self, volts: Sequence[float], currents: Sequence[float]) -> tuple[list[float], tuple[str, ...]]:
+        """The volts within the limit of each motor, and the limits met: see `Volts.within`."""
+        met: tuple[str, ...] = ()
+        for volt, limit in zip(volts, self._limits, strict=True):
+            if not abs(volt) < limit:
+                met = ("voltage",)
+        for current, limit in zip(currents, self._current_limits, strict=True):
+            if abs(current) > limit:
+                met = (*met, "current")
+                break
+        return [min(max(volt, -limit), limit) for volt, limit in zip(volts, self._limits, strict=True)], met
 
     def _commanded(
         self,
         dt: float,
-        off: FloatArray,
-        heading: FloatArray,
-        twist: FloatArray,
-        velocity: FloatArray,
-        raised_sum: FloatArray,
+        off: Three,
+        heading: float,
+        twist: tuple[float, ...],
+        velocity: tuple[float, ...],
+        raised_sum: Three,
     ) -> tuple[FloatArray, tuple[str, ...]]:
         """The commands of a speed loop; where the volts are at their limit, nothing is added to the sum of errors."""
         if self._reached is None:
             self._reached = twist
         else:
-            self._loop_sum = self._loop_sum + dt * (self._last - self._mean)
-        then = self.wanted(off, heading, velocity, raised_sum)
-        sent, mean, volts = self.commands.command(self._reached, then, self._loop_sum)
-        share = float(np.max(np.abs(volts) / self.commands.limit))
+            rows = zip(self._loop_sum, self._last.tolist(), self._mean, strict=True)
+            self._loop_sum = tuple(total + dt * (sent - mean) for total, sent, mean in rows)
+        count = len(self._zeros)
+        found = self._law(off, heading, velocity, raised_sum, 1.0, self._reached, self._loop_sum)
+        volts = found[2 * count : 3 * count]
+        share = max(abs(volt) / limit for volt, limit in zip(volts, self._limits, strict=True))
         if share <= 1.0:
             self._sum = raised_sum
         else:  # slower, as the motors can
-            then = self.wanted(off, heading, velocity, self._sum) / share
-            sent, mean, _ = self.commands.command(self._reached, then, self._loop_sum)
-        self._reached, self._mean = then, mean
-        return sent, () if share <= 1.0 else ("voltage",)
+            found = self._law(off, heading, velocity, self._sum, share, self._reached, self._loop_sum)
+        self._mean, self._reached = found[count : 2 * count], found[3 * count :]
+        return np.array(found[:count]), () if share <= 1.0 else ("voltage",)
 
     def wanted(self, off: FloatArray, heading: FloatArray, velocity: FloatArray, total: FloatArray) -> FloatArray:
         """The twist that a robot with a speed loop shall have a step later: as `aim` and `effort` (3,)."""
@@ -185,3 +236,18 @@ class Pid(Guarded):
     def effort(self, aim: Aim, total: FloatArray) -> Effort:
         """What that takes, with a sum of errors in the world [m s, m s, rad s]. (*batch, 3) -> (*batch, wheels)."""
         return self.volts.softly(aim.now, aim.change + self.gains.sum * product(aim.turned, total), aim.way)
+
+
+def _in_numbers(
+    shapes: Mapping[str, tuple[int, ...]], law: Callable[..., dict[str, Any]]
+) -> Callable[..., tuple[float, ...]]:
+    """A law of arrays as one of plain numbers, flat and in order: traced, or where that cannot be, as it stands."""
+    traced = scalar_function(shapes, law)
+    if traced is not None:
+        return traced
+
+    def called(*arguments: Any) -> tuple[float, ...]:
+        arrays = (np.reshape(value, shape) for value, shape in zip(arguments, shapes.values(), strict=True))
+        return tuple(np.concatenate(list(law(*arrays).values())).tolist())
+
+    return called

@@ -18,6 +18,9 @@ class PidBatch:
 
     def __init__(self, pid: Pid, count: int) -> None:
         self._pid, self._sum, self._t = pid, np.zeros((count, 3)), math.nan
+        self._estimator = pid._estimator
+        if self._estimator is not None:
+            self._poses = self._estimator.memories(count)
         self._gate, self._memories = PoseGate(pid.robot, pid.dt), np.zeros((count, 7, 3))
 
     def step_batch(self, t: float, pose: FloatArray, twist: FloatArray, path: Path) -> FloatArray:
@@ -26,6 +29,8 @@ class PidBatch:
         dt = 0.0 if math.isnan(self._t) else min(t - self._t, MOST_STEPS * pid.dt)
         self._t = t
         states = np.hstack([pose, twist])
+        if self._estimator is not None:
+            self._estimator.estimate_each(self._poses, t, states)
         self._gate.judge_each(self._memories, t, states)
         pose, twist = states[:, :3], states[:, 3:]
         motion = path.at(np.array([t, t + pid.late, t + pid.late + pid.dt]))

@@ -145,7 +145,7 @@ class Policy(Guarded):
             )
             raise InputError("the policy was trained for another drive", got=got, expected=expected, where="robot")
         super()._take(robot)
-        self._late_pose = self._filtered_twist = None  # it was trained on what sensors show
+        self._estimator = self._filtered_twist = None  # it was trained on what sensors show
         self._largest = largest_voltage(robot)
 
     def _output(

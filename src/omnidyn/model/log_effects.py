@@ -47,6 +47,7 @@ class Lateness(Value):
 
 INSTANTANEOUS, MEAN = "instantaneous", "mean"
 LATEST_POSE, FASTEST, SLOWEST_FILTER = 1.0, 1e5, 1.0  # [s], [Hz], [s]
+MOST_COUNTS, NOISIEST, MOST_BIAS = 1e7, 10.0, 1.0  # in a turn; [m], [rad], [rad/s]; [rad/s]
 SHORT_FILTER = 0.3  # of a step: what a shorter filter shows is nearer to the instant than to a mean
 
 
@@ -55,7 +56,10 @@ class Sensors(Value):
 
     twist: "instantaneous", or "mean": over the time since the step before, as differences of encoders are.
     twist_filter [s]: time constant of a low pass of first order behind that, 0 without one.
-    pose_delay [s]: age of a pose when it arrives. pose_rate [Hz]: of new poses, None: one in every step.
+    encoder_counts: in a turn of a wheel, None: nothing is known of them. gyro_noise, gyro_bias [rad/s]: std of a sample
+    of a gyroscope that gives omega, and of what it shows at rest; None: omega comes from the wheels.
+    pose_delay [s]: age of a pose when it arrives. pose_rate [Hz]: of new poses, None: one in every step. pose_noise
+    [m], heading_noise [rad]: std of a pose along x and along y, and of its heading; None: nobody says.
     """
 
     twist: Annotated[Literal["instantaneous", "mean"], Field(description="mean: differences of encoders")] = (
@@ -65,12 +69,31 @@ class Sensors(Value):
         Annotated[float, number(0.0, SLOWEST_FILTER)],
         Field(alias="twist_filter_s", description="time constant of a low pass of the speeds"),
     ] = 0.0
+    encoder_counts: Annotated[
+        Annotated[float, number(1.0, MOST_COUNTS)] | None, Field(description="counts in a turn of a wheel")
+    ] = None
+    gyro_noise: Annotated[
+        Annotated[float, number(0.0, NOISIEST)] | None,
+        Field(alias="gyro_noise_rad_s", description="std of a sample of a gyroscope"),
+    ] = None
+    gyro_bias: Annotated[
+        Annotated[float, number(0.0, MOST_BIAS)] | None,
+        Field(alias="gyro_bias_rad_s", description="std of what a gyroscope shows at rest"),
+    ] = None
     pose_delay: Annotated[
         Annotated[float, number(0.0, LATEST_POSE)],
         Field(alias="pose_delay_s", description="age of a pose when it arrives"),
     ] = 0.0
     pose_rate: Annotated[
         Annotated[float, number(0.1, FASTEST)] | None, Field(alias="pose_rate_Hz", description="of new poses")
+    ] = None
+    pose_noise: Annotated[
+        Annotated[float, number(0.0, NOISIEST)] | None,
+        Field(alias="pose_noise_m", description="std of a pose along x and along y"),
+    ] = None
+    heading_noise: Annotated[
+        Annotated[float, number(0.0, NOISIEST)] | None,
+        Field(alias="heading_noise_rad", description="std of the heading of a pose"),
     ] = None
 
     @property
@@ -86,10 +109,18 @@ class Sensors(Value):
         short = self.twist == INSTANTANEOUS and self.twist_filter < SHORT_FILTER * dt
         return self.replace(twist_filter=0.0) if short and self.twist_filter else self
 
+    @property
+    def has_gyroscope(self) -> bool:
+        """Whether omega comes from a gyroscope."""
+        return self.gyro_noise is not None or self.gyro_bias is not None
+
     def pose_age(self, dt: float) -> float:
         """The mean age of a new pose in a loop with steps of dt [s]: it waits for the step [s]."""
-        wait = 0.0 if self.pose_rate is None else 0.5 * min(dt, 1.0 / self.pose_rate)
-        return self.pose_delay + wait
+        return self.pose_delay + 0.5 * self.pose_wait(dt)
+
+    def pose_wait(self, dt: float) -> float:
+        """How long a new pose waits for a step of dt [s] at the most [s]."""
+        return 0.0 if self.pose_rate is None else min(dt, 1.0 / self.pose_rate)
 
 
 Force = Annotated[float, number(-HARDEST, HARDEST)]

@@ -117,9 +117,9 @@ SENTENCES = {
     "best_tracked": Sentence(_best_tracked),
     "steps_with_status": Sentence("{count} of {steps} steps: {subject}"),
     "pose_lag_of_log": Sentence(
-        "controllers of {subject} take poses as {pose_delay:.3g} s old, as they were in the log of the fit; if yours "
-        'are new, such as those of odometry, write twist = "{twist}" and pose_delay_s = 0 under [sensors] of the robot '
-        "file"
+        "controllers of {subject} take poses as {pose_delay:.3g} s old, as in the log of the fit, but as new where "
+        "they move with the wheels from the first step on; is your loop fed otherwise? If its poses are new, "
+        'write twist = "{twist}" and pose_delay_s = 0 under [sensors] of the robot file, else their age and rate'
     ),
     "can_follow": Sentence(_can_follow),
     "cannot_follow": Sentence(_cannot_follow),

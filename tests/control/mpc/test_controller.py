@@ -195,7 +195,7 @@ def test_many_robots_doubt_poses_as_one_does():
         assert np.array_equal(many.step_batch(k * DT, poses, twists, along), [sent] * 2)
     assert len(doubts) > 1  # some poses were doubted
     with pytest.raises(InputError, match="as they are"):
-        Mpc(ROBOT.replace(sensors=Sensors(pose_delay=0.1))).batch(2)
+        Mpc(ROBOT.replace(sensors=Sensors(twist_filter=0.1))).batch(2)
 
 
 @pytest.mark.parametrize(
@@ -322,13 +322,13 @@ def test_weights_that_rounding_cannot_follow_are_said_and_the_output_is_sent():
 
 
 def test_weights_follow_the_robot_and_are_the_paper_s_for_its_own():
-    own = Settings().of(ROBOT)
+    own = Settings().of(ROBOT, DT)
     assert (own.pose, own.volts, own.walk) == ((200.0, 200.0, 20.0), 2e-3, (0.003, 0.003, 0.012))
-    heavy = Settings().of(ROBOT.replace(body=ROBOT.body.replace(mass=4.0 * ROBOT.body.mass)))
+    heavy = Settings().of(ROBOT.replace(body=ROBOT.body.replace(mass=4.0 * ROBOT.body.mass)), DT)
     np.testing.assert_allclose(heavy.pose, (800.0, 800.0, 80.0))
     np.testing.assert_allclose(heavy.walk, (0.006, 0.006, 0.024))
     assert heavy.volts == pytest.approx(2e-3 / 16.0)
-    assert Settings(pose=(1.0, 2.0, 3.0), volts=0.1).of(ROBOT).pose == (1.0, 2.0, 3.0)
+    assert Settings(pose=(1.0, 2.0, 3.0), volts=0.1).of(ROBOT, DT).pose == (1.0, 2.0, 3.0)
 
 
 @pytest.mark.parametrize("latency", [0.029, 0.03])

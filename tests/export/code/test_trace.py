@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from omnidyn.export.code.c_types import TranslationError
-from omnidyn.export.code.trace import inputs, statements
+from omnidyn.compiled.trace import TranslationError, inputs, scalar_function
+from omnidyn.export.code.trace import statements
 
 
 def lines(value, single=False):
@@ -41,7 +41,18 @@ def test_a_branch_on_an_input_and_what_c_does_not_have_are_refused():
     x = inputs("x", ())
     with pytest.raises(TranslationError, match="trace both sides"):
         bool(x > 1.0)
-    with pytest.raises(TranslationError, match="no C for"):
+    with pytest.raises(TranslationError, match="no formula for"):
         np.arctan(x)
-    with pytest.raises(TranslationError, match="power"):
-        x**3
+
+
+def test_a_function_of_numbers_is_that_of_arrays():
+    def law(x, heading):
+        cos, far = np.cos(heading), np.where(x[0] > x[1:], x[0], -x[1:])
+        return {"y": far * cos + np.exp(x[2]) ** 1.5, "z": np.clip(np.sqrt(np.abs(x)), 0.5, 1.0) - np.sign(x)}
+
+    traced = scalar_function({"x": (3,), "heading": ()}, law)
+    assert traced is not None
+    for x, heading in (((1.0, -2.0, 0.3), 0.4), ((-0.1, 0.0, 2.0), -3.0)):
+        found = law(np.array(x), heading)
+        np.testing.assert_allclose(traced(x, heading), np.concatenate([found["y"], found["z"]]), rtol=1e-15)
+    assert scalar_function({"x": (3,)}, lambda x: {"y": x if x[0] > 0.0 else -x}) is None

@@ -9,7 +9,8 @@ import subprocess
 import numpy as np
 import pytest
 
-from omnidyn.export.code.c_types import INT, REAL, Array, TranslationError, record_type
+from omnidyn.compiled.trace import TranslationError
+from omnidyn.export.code.c_types import INT, REAL, Array, record_type
 from omnidyn.export.code.program import CProgram
 from omnidyn.export.code.sources import Source, source_of
 from tests.support.exported import STRICT

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import time
 from copy import copy
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -31,6 +32,7 @@ from omnidyn.control.controller import (
     MOST_BRIDGED,
     OK,
     PATH_ENDED,
+    SWINGS,
     TIME_STANDS_STILL,
     VOLTAGE,
     WAITING,
@@ -47,12 +49,13 @@ from omnidyn.control.controller import (
 )
 from omnidyn.control.feedforward import DT, check_dt, loop_motor
 from omnidyn.control.filtered_twist import FilteredTwist, filtered_twist
-from omnidyn.control.late_pose import LatePose, late_pose
 from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Memory, MpcBatch, MpcWorkspace, control_step, expect
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import PUSH, SCALE
-from omnidyn.control.mpc.settings import Preview, Settings
+from omnidyn.control.mpc.settings import FILTERED, Preview, Settings
+from omnidyn.control.pose_estimator import PoseEstimator, pose_estimator
 from omnidyn.control.pose_gate import TRUSTED, PoseGate
+from omnidyn.control.swing import Swing
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope
@@ -72,7 +75,7 @@ class Mpc:
     """
 
     name = "mpc"
-    _late_pose: LatePose | None = None
+    _estimator: PoseEstimator | None = None
     _filtered_twist: FilteredTwist | None = None
     _gate: PoseGate
 
@@ -128,20 +131,28 @@ class Mpc:
         if rest > 0.0:
             self._room.rest[:] = numbers(driven, rest, self.friction, loop).linear
         self._numbers = numbers(driven, self.dt, self.friction, loop)
-        self.robot_settings = self.settings.of(robot, None if loop is None else driven)
+        noise = self.settings.pose_noise
+        given = None if noise is None else (noise[0], noise[2])
+        self._estimator = pose_estimator(robot, self.dt, self._estimator, given)
+        self.robot_settings = self.settings.of(robot, self.dt, None if loop is None else driven)
+        self.observer_settings = self.robot_settings
+        if self._estimator is not None:
+            place, heading = self._estimator.noise
+            self.robot_settings = replace(self.robot_settings, pose_noise=(place, place, heading))
+            self.observer_settings = replace(self.robot_settings, pose_noise=FILTERED)
         self._tables = self.robot_settings.tables(driven, self.dt, self.observer)
-        self._late_pose = late_pose(robot, self.dt, self._late_pose)
         self._filtered_twist = filtered_twist(robot, self._filtered_twist)
         self._gate = PoseGate(robot, self.dt, vars(self).get("_gate"))
+        self._swing = Swing(robot, self.dt)
         self._control = None  # compiled by the first step
 
     def reset(self) -> None:
         """Forget all steps."""
-        self._memory = Memory.of(self.horizon, self.robot.wheels.count, self._preview.inputs, self.robot_settings)
+        self._memory = Memory.of(self.horizon, self.robot.wheels.count, self._preview.inputs, self.observer_settings)
         self._known, self._t, self._last = False, math.nan, self._zeros.copy()
         self._asked: tuple[str, int, float] = (WAITING, 0, 0.0)
         self._state, self._missing, self._since = np.zeros(6), 0, math.nan
-        for sensor in (self._late_pose, self._filtered_twist, self._gate):
+        for sensor in (self._estimator, self._filtered_twist, self._gate, self._swing):
             if sensor is not None:
                 sensor.reset()
 
@@ -155,7 +166,7 @@ class Mpc:
             return clone
         same_friction = robot.friction == self.robot.friction
         clone._memory, clone._state = (
-            self._memory.copied(None if same_friction else clone.robot_settings),
+            self._memory.copied(None if same_friction else clone.observer_settings),
             self._state.copy(),
         )
         if clone._preview.rest == self._preview.rest:
@@ -171,22 +182,22 @@ class Mpc:
     def batch(self, count: int) -> MpcBatch:
         """As many controllers of the same robot as asked for, in one: `Batch.step_batch`. They begin anew.
 
-        Raises InputError for a robot whose poses arrive late or whose speeds are filtered.
+        Raises InputError for a robot whose speeds are filtered.
         """
-        if self._late_pose is not None or self._filtered_twist is not None:
+        if self._filtered_twist is not None:
             raise InputError(
-                "many robots in one take poses and speeds as they are",
-                got=f"sensors of {self.robot.name}: poses that arrive late, or filtered speeds",
-                expected="[sensors] without pose_delay_s, pose_rate_Hz and twist_filter_s, or an Mpc for each robot",
+                "many robots in one take speeds as they are",
+                got=f"sensors of {self.robot.name}: filtered speeds",
+                expected="[sensors] without twist_filter_s, or an Mpc for each robot",
                 where="batch",
             )
         return MpcBatch(
             self._numbers,
             self._tables,
             self._room,
-            self.robot_settings,
+            self.observer_settings,
             self._preview,
-            PoseGate(self.robot, self.dt),
+            (self._estimator, PoseGate(self.robot, self.dt)),
             self._per_command,
             _whole("count", count, 1, 10_000_000),
         )
@@ -195,7 +206,7 @@ class Mpc:
     def info(self) -> Info:
         """What the last step did."""
         status, iterations, took = self._asked
-        if status not in (OK, PATH_ENDED, INACCURATE, *DOUBTS.values()):
+        if status not in (OK, PATH_ENDED, INACCURATE, SWINGS, *DOUBTS.values()):
             return Info(status, iterations, took)
         return Info(status, iterations, took, self._memory.x[1:, :3].copy(), self._met())
 
@@ -231,9 +242,9 @@ class Mpc:
                 twist = vector(twist)
             if self._filtered_twist is not None:
                 twist = self._filtered_twist.mean(t, twist)
-            if self._late_pose is not None:
-                pose = self._late_pose.now(t, pose, twist)
             state[:3], state[3:] = pose, twist
+            if self._estimator is not None:
+                self._estimator.estimate(float(t), state)
             verdict = self._gate.judge(float(t), state)
             sent = self._solved(t, since, path, start)
             self._missing = 0
@@ -249,7 +260,7 @@ class Mpc:
     def _bridged(self, t: float, path: Any, word: str, start: float) -> FloatArray:
         """The output of a step with what is expected in place of a sample that lacks a measurement."""
         self._missing += 1
-        expect(self._numbers, self.sensors.averaged, self._memory, self._room, self._state)
+        expect(self._numbers, self.sensors.averaged, self._since, self._memory, self._room, self._state)
         sent = self._solved(t, self._since, path, start)
         if self._asked[0] in (OK, PATH_ENDED):
             self._asked = (BRIDGED[word], self._asked[1], self._asked[2])
@@ -274,7 +285,9 @@ class Mpc:
         if self.output != VOLTAGE:
             sent = np.clip(sent, -self.limit, self.limit)
         self._last = sent
-        status = INACCURATE if inaccurate else PATH_ENDED if t > preview.end else OK
+        wanted, (vx, vy, omega) = preview.rows[row - preview.late, 3:].tolist(), self._state[3:].tolist()
+        swinging = self._swing.found(float(t), vx - wanted[0], vy - wanted[1], omega - wanted[2])
+        status = INACCURATE if inaccurate else SWINGS if swinging else PATH_ENDED if t > preview.end else OK
         self._asked = (status, passes, time.perf_counter() - start)
         return sent.copy()
 

@@ -54,6 +54,7 @@ from omnidyn.control.mpc.program import (
 from omnidyn.control.mpc.riccati import ANSWER_SIZE, STAGE_SIZE, drive_of
 from omnidyn.control.mpc.settings import Preview, Settings, Tables
 from omnidyn.control.mpc.small import put3, vector
+from omnidyn.control.pose_estimator import PoseEstimator
 from omnidyn.control.pose_gate import PoseGate
 from omnidyn.errors import InputError
 
@@ -274,10 +275,13 @@ def control(numbers, tables, preview, start, state, elapsed, memory, room):
 
 
 @kernel
-def expect(numbers, averaged, memory, room, state):
-    """Write into `state` (6,) what is expected to be measured."""
+def expect(numbers, averaged, elapsed, memory, room, state):
+    """Write into `state` (6,) what is expected to be measured after a time [s]."""
     before, begin = vector(memory.estimate, POSE, 0), vector(memory.estimate, TWIST, 0)
     drive = last_drive(numbers, memory, room)
+    if abs(elapsed - numbers.linear[0, STEP]) > SAME_STEP * elapsed:
+        held_for(numbers.linear, elapsed, room.linear)
+        numbers = Numbers(room.linear, numbers.push, numbers.pull, numbers.levels)
     pose, twist = run_on(numbers, memory.estimate, room.stage, before, begin, drive)
     if averaged:
         twist = mean_twist(numbers.linear[0, STEP], before, begin, pose, twist)
@@ -319,12 +323,13 @@ class MpcBatch:
         room: MpcWorkspace,
         settings: Settings,
         preview: Preview,
-        gate: PoseGate,
+        sensors: tuple[PoseEstimator | None, PoseGate],
         per_volt: float | FloatArray,
         count: int,
     ) -> None:
         self.count, self._numbers, self._tables, self._room, self._settings = count, numbers, tables, room, settings
-        self._like, self._gate, self._per_volt = preview, gate, per_volt
+        self._like, self._per_volt = preview, per_volt
+        self._estimator, self._gate = sensors
         self.reset()
 
     def reset(self) -> None:
@@ -333,6 +338,8 @@ class MpcBatch:
         self._memory = Memory._make(np.repeat(array[None], self.count, axis=0) for array in blank)
         self._known, self._seen = np.zeros(self.count, bool), np.zeros((self.count, 7, 3))
         self._previews: list[Preview] = []
+        if self._estimator is not None:
+            self._poses = self._estimator.memories(self.count)
 
     def step_batch(self, t: float, pose: FloatArray, twist: FloatArray, path: Any | Sequence[Any]) -> FloatArray:
         """Volts (commands of a speed loop) of all robots from t [s] on, shape (count, wheels). Steps are `dt` apart.
@@ -342,6 +349,8 @@ class MpcBatch:
         Raises InputError for other shapes.
         """
         state = np.concatenate([self._checked("pose", pose), self._checked("twist", twist)], axis=1)
+        if self._estimator is not None:
+            self._estimator.estimate_each(self._poses, t, state)
         self._gate.judge_each(self._seen, t, state)
         paths = list(path) if isinstance(path, Sequence) else [path]
         if len(paths) not in (1, self.count):

@@ -38,8 +38,12 @@ WALK: Three = (0.003, 0.003, 0.012)
 PUSH_WALK: Three = (0.02, 0.02, 0.08)
 PAPER_RATE, MOST_WALK = 6.7, 4.0  # [1/s] at which the paper's robot settles; times as much for a faster speed loop
 LOOP_VOLTS = 0.25  # of the cost of volts, of commands of a speed loop: that is smooth by itself
+NOISE: Three = (0.01, 0.01, 0.04)
 POSE_NOISE: Three = (0.002, 0.002, 0.004)
-LATE_NOISE = 4.0  # times as much of a late pose: when it was taken is not known to the millisecond
+FILTERED: Three = (1e-9, 1e-9, 1e-9)  # of poses that come from a PoseEstimator: the observer believes them
+MOST_PRECISE = 8.0  # times as fast it learns a push of sensors that are so many times as precise as NOISE
+LEAST_NOISE = np.array([2e-4, 2e-4, 8e-4])
+TURN = 2.0 * math.pi
 PAPER_MASS = 1.5  # [kg]
 PER_VOLT_SQUARE = 4.788951776922385  # [m^2/s^4/V^2] sum of its squared accelerations in the plane by 1 V on a wheel
 
@@ -61,11 +65,12 @@ class Settings:
     """Weights of errors of the pose [1/m^2, 1/m^2, 1/rad^2], of the twist, of volts beside those of the path [1/V^2].
 
     pose, volts, walk: None: POSE, VOLTS and WALK of the paper's robot; of another volts go with the square of what a
-    volt speeds it up by, pose and the square of walk with the mass. pose_noise: None: POSE_NOISE, LATE_NOISE times as
-    much where poses are late. push_walk: None: PUSH_WALK; behind a speed loop it goes with the rate at which that
-    settles, MOST_WALK times as much at the most: the same share of a model that is wrong is a larger push there.
+    volt speeds it up by, pose and the square of walk with the mass. pose_noise: None: what the sensors say of it, else
+    POSE_NOISE. push_walk: None: PUSH_WALK; behind a speed loop it goes with the rate at which that settles, MOST_WALK
+    times as much at the most: the same share of a model that is wrong is a larger push there.
     last: how much more the end of the horizon counts. again: how often at most a step is made linear anew.
-    noise, pose_noise: std of the measured twist and pose that the observer expects [m/s, m/s, rad/s], [m, m, rad].
+    noise, pose_noise: std of the measured twist and pose that the observer expects [m/s, m/s, rad/s], [m, m, rad];
+    noise: None: NOISE, `twist_noise` where that is more; where it is less, push_walk is larger by as much.
     walk, pose_walk: std of what a step may bring that the model does not know. push_walk: of the change of an unknown
     push in a step [m/s^2, m/s^2, rad/s^2]; scale_walk: of the share of the modelled friction.
     current: limit of each motor [A], that of the robot's motors by default. slew: limit of the change of volts [V/s].
@@ -77,7 +82,7 @@ class Settings:
     volts: float | None = None
     last: float = 5.0
     again: int = 2
-    noise: Three = (0.01, 0.01, 0.04)
+    noise: Three | None = None
     pose_noise: Three | None = None
     walk: Three | None = None
     pose_walk: Three = (5e-4, 5e-4, 1e-3)
@@ -90,7 +95,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name in ("pose", "twist", "noise", "pose_noise", "walk", "pose_walk", "push_walk"):
-            if name in ("pose", "walk", "pose_noise", "push_walk") and getattr(self, name) is None:
+            if name != "twist" and name != "pose_walk" and getattr(self, name) is None:
                 continue
             value = np.asarray(getattr(self, name), dtype=float)
             if value.shape != (3,) or not np.all((value >= 0.0) & (value <= 1e9)):
@@ -109,8 +114,10 @@ class Settings:
         if self.volts is not None and not 1e-9 <= self.volts <= 1e9:
             raise InputError("out of range", got=self.volts, expected="1e-09 to 1e+09, or None", where="volts")
 
-    def of(self, robot: Robot, driven: Robot | None = None) -> Settings:
-        """The settings with a number in place of each None, for a robot; driven: as its speed loop lets it be driven.
+    def of(self, robot: Robot, dt: float, driven: Robot | None = None) -> Settings:
+        """The settings with a number in place of each None, for a robot and steps of dt [s].
+
+        driven: the robot as its speed loop lets it be driven.
 
         A heavier robot has more of what its model does not know, and pays less for the volts that correct it. Both laws
         were found beside others on `bench control_real`. A volt that a speed loop answers with more back-EMF speeds it
@@ -128,16 +135,17 @@ class Settings:
         push_walk = self.push_walk
         if push_walk is None:
             more = 1.0 if driven is None else min(max(_rate(driven) / PAPER_RATE, 1.0), MOST_WALK)
-            push_walk = tuple(more * std for std in PUSH_WALK)
-        sensors, pose_noise = robot.sensor_model, self.pose_noise
-        if pose_noise is None:
-            late = sensors.pose_delay > 0.0 or sensors.pose_rate is not None
-            pose_noise = tuple((LATE_NOISE if late else 1.0) * std for std in POSE_NOISE)
-        return replace(self, pose=pose, walk=walk, volts=volts, pose_noise=pose_noise, push_walk=push_walk)
+            rows = zip(PUSH_WALK, NOISE, twist_noise(robot, dt), strict=True)
+            push_walk = tuple(more * std * min(max(most / noise, 1.0), MOST_PRECISE) for std, most, noise in rows)
+        pose_noise = POSE_NOISE if self.pose_noise is None else self.pose_noise
+        noise = self.noise
+        if noise is None:  # what a model misses of a step is no less than that of usual sensors
+            noise = tuple(np.maximum(NOISE, twist_noise(robot, dt)).tolist())
+        return replace(self, pose=pose, walk=walk, volts=volts, noise=noise, pose_noise=pose_noise, push_walk=push_walk)
 
     def tables(self, robot: Robot, dt: float, learn: bool) -> Tables:
         """The settings for a robot and steps of dt [s]; learn: whether the observer runs."""
-        settings = self.of(robot)
+        settings = self.of(robot, dt)
         table, count = np.zeros(SETTINGS_SIZE), robot.wheels.count
         table[POSE_WEIGHT : POSE_WEIGHT + 3], table[TWIST_WEIGHT : TWIST_WEIGHT + 3] = settings.pose, settings.twist
         table[LAST_WEIGHT], table[AGAIN], table[LEARN] = self.last, self.again, learn
@@ -152,6 +160,23 @@ class Settings:
         )
         limit = np.array([volts(robot), np.minimum(amperes * per_wheel(robot.motor.resistance, count), 1e9)])
         return Tables(table, np.full(count, settings.volts), limit, emf(robot))
+
+
+def twist_noise(robot: Robot, dt: float) -> Three:
+    """Std of a measured twist [m/s, m/s, rad/s]: of counts of encoders and of a gyroscope, as the sensors say.
+
+    A difference of counts is off by that of two roundings, q/sqrt(6) where a count is q [m] at the rim; over a step of
+    dt [s] that is q/(sqrt(6) dt) of the speed of the rim.
+    """
+    sensors = robot.sensor_model
+    noise = np.array(NOISE)
+    if sensors.encoder_counts is not None:
+        rim = TURN * robot.wheels.radii / (sensors.encoder_counts * math.sqrt(6.0) * dt)
+        noise = np.sqrt(np.linalg.pinv(robot.wheels.wrench_matrix.T) ** 2 @ rim**2)
+    if sensors.has_gyroscope:
+        noise[2] = math.hypot(sensors.gyro_noise or 0.0, sensors.gyro_bias or 0.0)
+    along, across, turning = np.maximum(noise, LEAST_NOISE).tolist()
+    return along, across, turning
 
 
 def _rate(robot: Robot) -> float:

@@ -3,7 +3,7 @@
     int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[3], const float twist[3],
                              const omnidyn_motion path[3], float output[]);
 
-What it works out is traced from the controllers of Python (trace.py): there is one formula.
+What it works out is traced from the controllers of Python (compiled/trace.py): there is one formula.
 """
 
 from __future__ import annotations
@@ -18,15 +18,33 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.compiled.trace import Traced, inputs
 from omnidyn.control.controller import LARGEST_STATE, LATEST, MOST_BRIDGED, WHEEL_SPEED, Safe
 from omnidyn.control.controllers import controller_spec
 from omnidyn.control.feedforward import DT, Feedforward, check_dt
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.motion import Path, Reference
 from omnidyn.control.pid import Pid
+from omnidyn.control.pose_estimator import (
+    AGE,
+    ALIKE,
+    ALL_OF_IT,
+    BY_DISTANCE,
+    BY_TIME,
+    BY_TURN,
+    LONGEST,
+    OUTLIER_SQUARE,
+    PLACE_STD,
+    TURN_BY_DISTANCE,
+    TURN_BY_TIME,
+    TURN_STD,
+    UNSURE,
+    WAIT_STD,
+    rows_of,
+)
 from omnidyn.control.speed_loop import MOST_STEPS, SpeedController
 from omnidyn.export.code.mpc_code import mpc_code, mpc_input, mpc_memory, mpc_switches
-from omnidyn.export.code.trace import Traced, inputs, statements
+from omnidyn.export.code.trace import statements
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse, refuse_controller
 from omnidyn.export.spelling import c_comment, c_number, filled
@@ -96,8 +114,8 @@ def _header(law: Any, about: str) -> str:
 
 
 def _is_late(law: Any) -> bool:
-    """Whether the poses of its robot are old when they arrive."""
-    return law.sensors.pose_age(law.dt) > 0.0
+    """Whether an estimator stands between the poses of its robot and itself."""
+    return law._estimator is not None
 
 
 def _is_commanded(law: Any) -> bool:
@@ -106,25 +124,43 @@ def _is_commanded(law: Any) -> bool:
 
 
 def _late_rows(law: Any) -> int:
-    """How many steps are kept, where they may be half as long as they should be; 0 where poses are new."""
-    return math.ceil(2.0 * law.sensors.pose_age(law.dt) / law.dt) + 2 if _is_late(law) else 0
+    """How many steps are kept; 0 where poses are taken as they are."""
+    return rows_of(float(law._estimator.numbers[AGE]), law.dt) if _is_late(law) else 0
 
 
 def _late_pose_code(law: Any) -> str:
-    """The function that brings a late pose up to now, none where poses are new."""
+    """The function that brings a pose up to now, none where poses are taken as they are."""
     if not _is_late(law):
         return "#define LATE_ROWS 0"
-    numbers = {"ROWS": _late_rows(law), "MEAN": int(law.sensors.averaged), "AGE": _c(law.sensors.pose_age(law.dt))}
-    defines = "\n".join(f"#define LATE_{name} {value}" for name, value in numbers.items())
-    text = files("omnidyn.export.code").joinpath("late_pose.c").read_text("utf-8")
+    numbers = law._estimator.numbers.tolist()
+    texts = {"ROWS": str(_late_rows(law)), "MEAN": str(int(law.sensors.averaged))}
+    texts |= {name: _c(numbers[entry]) for name, entry in _LATE_NUMBERS.items()}
+    texts |= {"OUTLIER": _c(OUTLIER_SQUARE), "FULL_TURN": _c(2.0 * math.pi), "ALL_OF_IT": _c(ALL_OF_IT)}
+    texts |= {"UNSURE": str(int(numbers[UNSURE])), "LONGEST": _c(LONGEST * law.dt)}
+    texts |= {"ALIKE": _c(ALIKE), "TINY": _c(TINY_IN_C)}
+    defines = "\n".join(f"#define LATE_{name} {text}" for name, text in texts.items())
+    text = files("omnidyn.export.code").joinpath("pose_estimator.c").read_text("utf-8")
     return f"#include <string.h>\n\n{defines}\n\n{text.strip()}"
 
 
+TINY_IN_C = 2e-6  # [m], [rad]: what float32 makes of poses of some metres
+_LATE_NUMBERS = {
+    "AGE": AGE,
+    "NOISE": PLACE_STD,
+    "TURN_NOISE": TURN_STD,
+    "BY_DISTANCE": BY_DISTANCE,
+    "BY_TURN": BY_TURN,
+    "TURN_BY_DISTANCE": TURN_BY_DISTANCE,
+    "BY_TIME": BY_TIME,
+    "TURN_BY_TIME": TURN_BY_TIME,
+    "WAIT": WAIT_STD,
+}
 _LATE = """
-/* Places of the last steps, seen from where the robot is now, and the pose that arrived last. */
+/* Places of the last steps, seen from where the robot is now, the pose that arrived last, what is believed of it. */
 typedef struct {
-    float age[@ROWS@], place[@ROWS@][3], seen[3], then[3], twist[3], waited;
-    int count, known;
+    float age[@ROWS@], place[@ROWS@][3], seen[3], then[3], anchor[3], variance[2], drift[2], twist[3], waited;
+    float last[3];
+    int count, known, kind;
 } omnidyn_late;
 """
 
@@ -194,7 +230,7 @@ int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[
 """
 
 
-# A controller of one robot in C: its formulas traced from Python (trace.py), and what joins them
+# A controller of one robot in C: its formulas traced from Python (compiled/trace.py), and what joins them
 #
 # What joins them holds no formula of the robot: numbers are checked, errors summed up, outputs kept within limits, as
 # `Guarded.step` and the controllers' `_output` do.
@@ -337,7 +373,6 @@ def _summed(controller: Pid | SpeedController, arguments: str) -> str:
 
 def _pid(controller: Pid) -> tuple[list[str], str]:
     """(functions, statements that put what is wanted into `output`)."""
-    names = {"off": (3,), "heading": (), "twist": (3,), "velocity": (3, 3)}
     head = "float off[3], velocity[3][3]"
     gather = (
         "for (k = 0; k < 9; k++) {\n    velocity[k / 3][k % 3] = path[k / 3].velocity[k % 3];\n}\n"
@@ -345,34 +380,12 @@ def _pid(controller: Pid) -> tuple[list[str], str]:
         f"off[2] = remainderf(off[2], {_c(2.0 * np.pi)});\n"
     )
     if controller.output == WHEEL_SPEED:
-        count = controller.robot.wheels.count
-        names = {
-            "off": (3,),
-            "heading": (),
-            "velocity": (3, 3),
-            "total": (3,),
-            "share": (),
-            "now": (3,),
-            "loop": (count,),
-        }
-
-        def commands(
-            off: Any, heading: Any, velocity: Any, total: Any, share: Any, now: Any, loop: Any
-        ) -> dict[str, Any]:
-            then = controller.wanted(off, heading, velocity, total) / share
-            sent, mean, volts = controller.commands.command(now, then, loop)
-            return {"output": sent, "mean": mean, "volts": volts, "then": then}
-
         call = filled(_COMMANDED, LONGEST=_c(MOST_STEPS * controller.dt)).strip()
         return [
-            _function("commands", names, commands, controller)
+            _function("commands", *controller.law(), controller)
         ], f"{head}, more[3], volts[OMNIDYN_WHEELS], then[3], share = 1.0f;\n{gather}{call}"
-
-    def efforts(off: Any, heading: Any, twist: Any, velocity: Any, total: Any) -> dict[str, Any]:
-        return _named(controller.effort(controller.aim(off, heading, twist, velocity), total))
-
-    functions = [_function("effort", {**names, "total": (3,)}, efforts, controller)]
     call = _summed(controller, "off, pose[2], twist, (const float(*)[3])velocity")
+    functions = [_function("effort", *controller.law(), controller)]
     return functions, f"{head}, more[3], current[OMNIDYN_WHEELS];\n{gather}{call}"
 
 

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.compiled.trace import TranslationError
+
 # Functions of <math.h> that Python calls by the same name.
 MATH = frozenset(
     ("exp", "expm1", "log1p", "sqrt", "sin", "cos", "sinh", "cosh", "atan2", "copysign", "hypot", "ceil", "pow")
@@ -89,10 +91,6 @@ class ColumnTypes:
 
 Type = Scalar | Many | Array | NumpyRecord | Struct | ColumnTypes
 Typed = tuple[str, Type]
-
-
-class TranslationError(Exception):
-    """A kernel uses what the translator does not know: a fault of ours, found by tests, never by a user."""
 
 
 def joined(first: Type | None, second: Type) -> Type:

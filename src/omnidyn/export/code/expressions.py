@@ -11,6 +11,7 @@ import operator
 from types import ModuleType
 from typing import Any
 
+from omnidyn.compiled.trace import TranslationError
 from omnidyn.export.code.c_types import (
     BOOL,
     INT,
@@ -22,7 +23,6 @@ from omnidyn.export.code.c_types import (
     NumpyRecord,
     Scalar,
     Struct,
-    TranslationError,
     Type,
     Typed,
     address,

@@ -212,7 +212,7 @@ def _matrices(controller: Mpc, linear: np.ndarray) -> dict[str, Any]:
         assert (GX, BY_MASS_GX, SOFT_SPEED) == (0, 3, 9)  # columns that model.c counts by hand
         matrices["LEVEL"] = numbers.levels[:, : SOFT_SPEED + 1]  # what falls with the speed has no C
     if controller.observer:
-        matrices |= _noise(settings)
+        matrices |= _noise(controller.observer_settings)
     return matrices
 
 

@@ -1,25 +1,19 @@
-"""A function of arrays as C99: it is run on arrays whose entries are expressions, and what comes out is written down.
+"""A function of arrays as C99: what compiled/trace.py traces, written down.
 
     twist = inputs("twist", (3,))
     statements({"volts": some_function(twist)}, single=True)      ["const float t1 = ...;", ..., "volts[0] = ...;"]
 
-Translating source (translate.py) suits kernels, loops over tables; this suits NumPy. Numbers that do not depend on the
-inputs are worked out now, in float64; what is 0 falls away. A branch on an input raises TranslationError: the caller
-traces both sides.
+Translating source (translate.py) suits kernels, loops over tables; this suits NumPy.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any, Self
+from collections.abc import Mapping
+from typing import Any
 
-import numpy as np
-
-from omnidyn.export.code.c_types import TranslationError
+from omnidyn.compiled.trace import StatementWriter
 from omnidyn.export.spelling import c_number
 
-LONGEST = 100  # of an expression on a line of its own
 # Operation -> C, of the texts of its operands; f is the suffix of functions of float.
 _C: dict[str, str] = {
     "+": "({0} + {1})",
@@ -41,259 +35,20 @@ _C: dict[str, str] = {
     "sqrt": "sqrt{f}({0})",
     "cos": "cos{f}({0})",
     "sin": "sin{f}({0})",
+    "exp": "exp{f}({0})",
+    "pow": "pow{f}({0}, {1})",
     "max": "max_of({0}, {1})",
     "min": "min_of({0}, {1})",
 }
-_TRUTHS = frozenset((">", ">=", "<", "<=", "==", "and", "or", "not"))
-
-
-@dataclass(frozen=True, eq=False)
-class Node:
-    """An expression: an operation on others, or an input (`operation` is "", `name` its C)."""
-
-    operation: str
-    of: tuple[Node | float, ...] = ()
-    name: str = ""
-
-    def __bool__(self) -> bool:
-        raise TranslationError(f"a branch on {self.operation or self.name}: trace both sides")
-
-    def __add__(self, other: Any) -> Any:
-        return _sum(self, other)
-
-    def __radd__(self, other: Any) -> Any:
-        return _sum(other, self)
-
-    def __sub__(self, other: Any) -> Any:
-        return self if _is(other, 0.0) else _made("-", self, other)
-
-    def __rsub__(self, other: Any) -> Any:
-        return -self if _is(other, 0.0) else _made("-", other, self)
-
-    def __mul__(self, other: Any) -> Any:
-        return _product(self, other)
-
-    def __rmul__(self, other: Any) -> Any:
-        return _product(other, self)
-
-    def __truediv__(self, other: Any) -> Any:
-        return _made("/", self, other) if isinstance(other, Node) else _product(self, 1.0 / float(other))
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return 0.0 if _is(other, 0.0) else _made("/", other, self)
-
-    def __neg__(self) -> Any:
-        return self.of[0] if self.operation == "neg" else _made("neg", self)
-
-    def __pow__(self, other: Any) -> Any:
-        if other != 2:
-            raise TranslationError(f"no C for a power of {other}")
-        return _product(self, self)
-
-
-def _is(value: Any, number: float) -> bool:
-    return not isinstance(value, Node) and value == number
-
-
-def _made(operation: str, *of: Any) -> Node:
-    return Node(operation, tuple(operand if isinstance(operand, Node) else float(operand) for operand in of))
-
-
-def _sum(first: Any, second: Any) -> Any:
-    if _is(first, 0.0) or _is(second, 0.0):
-        return second if _is(first, 0.0) else first
-    return _made("+", first, second)
-
-
-def _product(first: Any, second: Any) -> Any:
-    for a, b in ((first, second), (second, first)):
-        if _is(a, 0.0):
-            return 0.0
-        if _is(a, 1.0):
-            return b
-        if _is(a, -1.0):
-            return -b
-    return _made("*", first, second)
-
-
-def _elementwise(operation: str, operator: Callable[..., Any], arguments: int) -> np.ufunc:
-    """An operation entry by entry: worked out by `operator` where all operands are numbers, else an expression."""
-
-    def one(*of: Any) -> Any:
-        return _made(operation, *of) if any(isinstance(operand, Node) for operand in of) else operator(*of)
-
-    return np.frompyfunc(one, arguments, 1)
-
-
-def _both(first: Any, second: Any) -> Any:
-    """The logical and; a truth that is known decides or falls away."""
-    if isinstance(first, Node) and isinstance(second, Node):
-        return _made("and", first, second)
-    truth, remainder = (first, second) if not isinstance(first, Node) else (second, first)
-    return remainder if truth else False
-
-
-def _chosen(test: Any, chosen: Any, alternative: Any) -> Any:
-    """np.where of an entry."""
-    if not isinstance(test, Node):
-        return chosen if test else alternative
-    alike = chosen is alternative or (
-        not isinstance(chosen, Node) and not isinstance(alternative, Node) and chosen == alternative
-    )
-    return chosen if alike else _made("?", test, chosen, alternative)
-
-
-_WHERE = np.frompyfunc(_chosen, 3, 1)
-_UFUNCS: dict[Any, np.ufunc] = {
-    **{
-        ufunc: _elementwise(sign, ufunc, 2)
-        for ufunc, sign in (
-            (np.greater, ">"),
-            (np.greater_equal, ">="),
-            (np.less, "<"),
-            (np.less_equal, "<="),
-            (np.equal, "=="),
-            (np.maximum, "max"),
-            (np.minimum, "min"),
-        )
-    },
-    **{
-        ufunc: _elementwise(name, ufunc, 1)
-        for ufunc, name in (
-            (np.sign, "sign"),
-            (np.absolute, "abs"),
-            (np.sqrt, "sqrt"),
-            (np.cos, "cos"),
-            (np.sin, "sin"),
-            (np.invert, "not"),
-        )
-    },
-    np.square: np.frompyfunc(lambda value: value * value, 1, 1),
-    np.bitwise_and: np.frompyfunc(_both, 2, 1),
-    np.logical_and: np.frompyfunc(_both, 2, 1),
-}
-_REDUCED: dict[Any, Any] = {np.all: np.logical_and, np.max: np.maximum, np.min: np.minimum}
-_ARITHMETIC = frozenset(
-    (np.add, np.subtract, np.multiply, np.true_divide, np.negative, np.matmul, np.power)
-)  # NumPy does these on objects by their operators
-
-
-class Traced(np.ndarray):
-    """An array of expressions. To NumPy it is one of floats, all NaN, so that `np.asanyarray` lets it pass."""
-
-    nodes: np.ndarray
-
-    @classmethod
-    def of(cls, nodes: Any) -> Self:
-        """An array of these expressions and numbers."""
-        nodes = np.asarray(nodes, dtype=object)
-        array = np.full(nodes.shape, np.nan).view(cls)
-        array.nodes = nodes
-        return array
-
-    def __getitem__(self, index: Any) -> Traced:
-        return Traced.of(self.nodes[index])
-
-    def __setitem__(self, index: Any, value: Any) -> None:
-        self.nodes[index] = _objects(value)
-
-    def __iter__(self) -> Any:
-        return (self[k] for k in range(len(self)))
-
-    def __bool__(self) -> bool:
-        raise TranslationError("a branch on an input: trace both sides")
-
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, out: Any = None, **options: Any) -> Any:
-        if ufunc not in _UFUNCS and ufunc not in _ARITHMETIC:
-            raise TranslationError(f"no C for {ufunc}")
-        options = {key: value for key, value in options.items() if key in ("axis", "keepdims")}
-        result = getattr(_UFUNCS.get(ufunc, ufunc), method)(*map(_objects, inputs), **options)
-        if out is None:
-            return Traced.of(result)
-        out[0].nodes[...] = result
-        return out[0]
-
-    def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
-        if func is np.where:
-            return Traced.of(_WHERE(*map(_objects, args)))
-        if func is np.clip:
-            return np.minimum(np.maximum(args[0], args[1]), args[2])
-        if func in _REDUCED:
-            return Traced.of(_UFUNCS[_REDUCED[func]].reduce(_objects(args[0]), **kwargs))
-        return Traced.of(func(*_deep(args), **{key: _deep(value) for key, value in kwargs.items()}))
-
-
-def _objects(value: Any) -> Any:
-    """An array of objects: the expressions of a traced one, the numbers of another."""
-    if isinstance(value, Traced):
-        return value.nodes
-    array = np.asarray(value)
-    return np.array(array.tolist(), dtype=object).reshape(array.shape)
-
-
-def _deep(value: Any) -> Any:
-    """Arguments of a function of NumPy, arrays in lists too."""
-    if isinstance(value, list | tuple):
-        return type(value)(_deep(item) for item in value)
-    return _objects(value) if isinstance(value, np.ndarray) else value
-
-
-def inputs(name: str, shape: tuple[int, ...]) -> Traced:
-    """An array that C has by this name: name[0], name[1], or name itself for shape ()."""
-    nodes = np.empty(shape, dtype=object)
-    for index in np.ndindex(shape):
-        nodes[index] = Node("", name=name + "".join(f"[{k}]" for k in index))
-    return Traced.of(nodes)
 
 
 def statements(outputs: Mapping[str, Any], single: bool) -> list[str]:
     """The lines of C that give arrays of these names their values. What is used more than once is worked out once."""
-    return _StatementWriter(single).of({name: _objects(value) for name, value in outputs.items()})
-
-
-class _StatementWriter:
-    """Expressions as statements, equal ones once."""
-
-    def __init__(self, single: bool) -> None:
-        self.single, self.real = single, "float" if single else "double"
-        self.lines: list[str] = []
-        self.texts: dict[int, str] = {}
-        self.names: dict[str, str] = {}
-        self.uses: dict[int, int] = {}
-
-    def of(self, outputs: dict[str, Any]) -> list[str]:
-        """See `statements`."""
-        for values in outputs.values():
-            for node in values.ravel():
-                self._count(node)
-        last = []
-        for name, values in outputs.items():
-            for index in np.ndindex(values.shape):
-                place = "".join(f"[{k}]" for k in index)
-                last.append(f"{name}{place} = {self._text(values[index])};")
-        return self.lines + last
-
-    def _count(self, node: Any) -> None:
-        if isinstance(node, Node):
-            self.uses[id(node)] = self.uses.get(id(node), 0) + 1
-            if self.uses[id(node)] == 1:
-                for operand in node.of:
-                    self._count(operand)
-
-    def _text(self, node: Any) -> str:
-        if not isinstance(node, Node):
-            return c_number(float(node), self.single)
-        if not node.operation:
-            return node.name
-        if id(node) not in self.texts:
-            text = _C[node.operation].format(*map(self._text, node.of), f="f" if self.single else "")
-            if self.uses[id(node)] > 1 or len(text) > LONGEST or text in self.names:
-                text = self._named(text, "int" if node.operation in _TRUTHS else self.real)
-            self.texts[id(node)] = text
-        return self.texts[id(node)]
-
-    def _named(self, text: str, kind: str) -> str:
-        if text not in self.names:
-            self.names[text] = f"t{len(self.names) + 1}"
-            self.lines.append(f"const {kind} {self.names[text]} = {text};")
-        return self.names[text]
+    real = "float" if single else "double"
+    writer = StatementWriter(
+        {operation: text.replace("{f}", "f" if single else "") for operation, text in _C.items()},
+        lambda value: c_number(value, single),
+        lambda name, text, is_truth: f"const {'int' if is_truth else real} {name} = {text};",
+    )
+    last = [f"{place} = {text};" for place, text in writer.of(outputs)]
+    return writer.lines + last

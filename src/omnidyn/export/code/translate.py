@@ -13,6 +13,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import Protocol
 
+from omnidyn.compiled.trace import TranslationError
 from omnidyn.export.code.c_types import (
     INT,
     REAL,
@@ -21,7 +22,6 @@ from omnidyn.export.code.c_types import (
     NumpyRecord,
     Scalar,
     Struct,
-    TranslationError,
     Type,
     Typed,
     address,
