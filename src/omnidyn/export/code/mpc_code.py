@@ -218,7 +218,7 @@ def _matrices(controller: Mpc, linear: np.ndarray) -> dict[str, Any]:
 
 def _noise(settings: Settings) -> dict[str, Any]:
     return {
-        "NOISE": np.square(settings.noise),
+        "NOISE": np.square(np.array(settings.noise, dtype=float)),
         "POSE_NOISE": np.square(np.array(settings.pose_noise, dtype=float)),
         "WALK": np.square(
             np.array((settings.walk, settings.push_walk, (settings.scale_walk,) * 3, settings.pose_walk), dtype=float)
