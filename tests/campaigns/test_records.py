@@ -52,7 +52,7 @@ def same_record(damaged, whole):
 
 def followed(error, folder):
     """Do what a remedy says; the hash of what is merged then."""
-    assert re.fullmatch(rf"make it( and \d+ more)? again: omnidyn sweep resume {folder} --repair", error.remedy)
+    assert re.fullmatch(rf"make it( and \d+ more)? again with `repair`: omnidyn sweep resume {folder}", error.remedy)
     with ThreadPoolExecutor(1) as thread:
         campaign = sweep(None, folder, task=product, executor=thread, repair=True)
     return sha256(campaign.folder.merge().read_bytes())

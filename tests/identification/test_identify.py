@@ -94,7 +94,7 @@ def test_a_longer_log_is_asked_for_against_noise_only(right):
         unidentifiable=(),
         half_width=lambda _: 0.6 * 1.96 / 2.0,
         is_known=lambda _: True,
-        lack_of_fit=SimpleNamespace(found=not right),
+        lack_of_fit=SimpleNamespace(found=not right, is_small=False),
     )
     words = str(*advice._wide(fit))
     assert ("times as long" in words) is right

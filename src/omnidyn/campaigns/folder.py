@@ -240,7 +240,7 @@ class Folder:
                 what,
                 got=got,
                 expected=expected,
-                remedy=f"make {count} again: omnidyn sweep resume {self.path} --repair",
+                remedy=f"make {count} again with `repair`: omnidyn sweep resume {self.path}",
                 where=str(self.shard_path(shard)),
             )
         return tuple(done)

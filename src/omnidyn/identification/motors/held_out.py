@@ -60,12 +60,15 @@ class MotorModel:
 class ModelChoice:
     """model: with the numbers that pay; plain_model: with none of NUMBERS; rejected: those that do not pay.
 
-    comparisons: of those of `rejected` that were plausible, how the model with it did beside that without."""
+    comparisons: of those of `rejected` that were plausible, how the model with it did beside that without. needed: of
+    those of the model that blocks need clearly.
+    """
 
     model: MotorModel
     plain_model: MotorModel
     rejected: tuple[str, ...]
     comparisons: Mapping[str, BlockComparison]
+    needed: tuple[str, ...] = ()
 
 
 def choose_model(
@@ -97,6 +100,7 @@ def choose_model(
         else plain_model
     )
     comparisons: dict[str, BlockComparison] = {}
+    needed: tuple[str, ...] = ()
     while wanted_names is None and model.names:
         if implausible_names := [name for name in model.names if not held_out.is_plausible(model, name)]:
             model = held_out.model(model.between, _without(model.names, *implausible_names), model.values)
@@ -109,13 +113,18 @@ def choose_model(
         best_model = min(smaller_models, key=lambda smaller_model: smaller_model.size)
         comparison = model.beside(best_model)
         if comparison.is_better:
+            needed = tuple(
+                name
+                for name in model.names
+                if all(model.beside(smaller).is_clear for smaller in smaller_models if name not in smaller.names)
+            )
             break
         comparisons |= dict.fromkeys(_without(model.names, *best_model.names), comparison)
         model = best_model
     if wanted_names is None and not (comparison := model.beside(plain_model)).is_better:
         comparisons |= dict.fromkeys(model.names, comparison)
         model = plain_model
-    return ModelChoice(model, plain_model, _without(candidate_names, *model.names), comparisons)
+    return ModelChoice(model, plain_model, _without(candidate_names, *model.names), comparisons, needed)
 
 
 def _without(names: Sequence[str], *removed_name: str) -> tuple[str, ...]:
@@ -246,7 +255,9 @@ def written_and_plain(logs: Sequence[MotorLog], motor: int, method: MotorFit) ->
         return fit(wanted_names or (BAND,), None), fit((), None)
     written_fit = fit(choice.model.names, choice.model)
     unseen: dict[str, tuple[float, float]] = {}
-    while wanted_names is None and (reaching := _reaching_zero(written_fit, choice.model.names)):
+    while wanted_names is None and (
+        reaching := _reaching_zero(written_fit, _without(choice.model.names, *choice.needed))
+    ):
         unseen |= reaching
         choice = choose_model(logs, motor, method.between, method.loss, unseen=tuple(unseen)) or choice
         written_fit = fit(choice.model.names, choice.model)

@@ -119,18 +119,18 @@ def remedies(
     kept_remedies = [
         (remedy, errors_after)
         for remedy, errors_after in ranking
-        if remedy.chi2 > RIVAL * worthy_results[0].chi2 and not compare_blocks(errors_after, errors_before).is_better
+        if remedy.chi2 > RIVAL * worthy_results[0].chi2 and not compare_blocks(errors_after, errors_before).is_clear
     ]
     return tuple(_best_first(kept_remedies)[:remedy_limit])
 
 
 def _best_first(ranking: Sequence[tuple[Remedy, FloatArray]]) -> list[Remedy]:
-    """By what they explain; before all of them what predicts held-out blocks better than the first.
+    """By what they explain; before all of them what predicts held-out blocks clearly better than the first.
 
     What rows do near the fit tells less of a large change than whether it holds on the next block. ranking: remedies,
     and the squared errors of held-out blocks with each.
     """
-    better_remedies = [r for r, errors in ranking if compare_blocks(ranking[0][1], errors).is_better]
+    better_remedies = [r for r, errors in ranking if compare_blocks(ranking[0][1], errors).is_clear]
     others = (r for r, _ in ranking if r not in better_remedies)
     return [*sorted(better_remedies, key=lambda r: -r.gain), *others]
 
