@@ -269,7 +269,7 @@ def test_no_part_calls_a_maker():
 
 
 def test_nobody_compiles_behind_our_back():
-    """numba is imported in compiled/; others import `kernel`, `listeners`, `parallel`, `stamp`, `trace`, what counts."""
+    """numba is imported in compiled/; others import `kernel`, `listeners`, `parallel`, `stamp`, `trace`, counts."""
     for file in PACKAGE.rglob("*.py"):
         if file.parent == PACKAGE / "compiled":
             continue
