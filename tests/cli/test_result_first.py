@@ -226,5 +226,5 @@ def test_a_signal_during_the_diagnosis_leaves_the_result(folder, tmp_path, numbe
         process = waiting(*place, *FIT, "-o", str(out), cwd=folder, stdout=stdout)
         robot = load_robot(out)  # it is there while the diagnosis is made
         assert ended(process, number)[0] == code
-    assert f"Not made: the diagnosis and the comparison with the logs ({words})." in " ".join(shown.read_text().split())
+    assert f"Not made: the diagnosis and the comparison with the logs ({words})" in " ".join(shown.read_text().split())
     assert robot.friction != load_robot("axebot").friction

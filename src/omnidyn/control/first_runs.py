@@ -14,6 +14,7 @@ from omnidyn.control.paths.path import path
 from omnidyn.control.pid import Pid
 from omnidyn.control.pid_batch import PidBatch
 from omnidyn.control.tracking import Tracking
+from omnidyn.model.log_effects import Sensors
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 
@@ -29,7 +30,16 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("predictive controllers of many robots", partial(_many, paper)),
         ("a measurement that is missing", partial(_bridged, paper)),
         ("pid of many robots", partial(_many_by_pid, paper)),
+        ("poses of a camera", partial(_seen, paper)),
     ]
+
+
+def _seen(robot: Robot) -> FloatArray:
+    """A step of one robot and of two whose poses arrive late."""
+    late = robot.replace(sensors=Sensors(pose_delay=0.06, pose_rate=30.0, pose_noise=1e-3))
+    at, route = np.zeros((2, 3)), path(PATH)
+    Pid(late).step(0.0, at[0], at[0], route)
+    return PidBatch(Pid(late), 2).step_batch(0.0, at, at, route)
 
 
 def _tracked(robot: Robot) -> Tracking:
