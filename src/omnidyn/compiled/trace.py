@@ -286,10 +286,6 @@ class StatementWriter:
         return self.names[text]
 
 
-# As a function of plain numbers: NumPy takes a microsecond for each operation, Python a tenth of that. No text becomes
-# code: the operations are walked one by one.
-
-
 def _over(a: float, b: float) -> float:
     """a/b, as NumPy has it where b is 0: what no branch takes is worked out too."""
     if b:
@@ -304,6 +300,8 @@ def _exp(a: float, _: float) -> float:
         return inf
 
 
+# As a function of plain numbers: NumPy takes a microsecond for each operation, Python a tenth of that. No text becomes
+# code: the operations are walked one by one.
 _NUMBERS: dict[str, Callable[[float, float], float]] = {
     "+": operator.add,
     "-": operator.sub,
