@@ -54,6 +54,20 @@ def test_a_campaign_from_its_spec_to_its_picture(spec, call):
     assert (spec / "picture.png").read_bytes()[:4] == b"\x89PNG"
 
 
+def test_a_damaged_shard_is_named_with_a_command_that_mends_it(spec, call):
+    call("sweep", "spec.toml", "-o", "out", "--workers", "1")
+    shard = spec / "out" / "shards" / "00001.parquet"
+    whole = shard.read_bytes()
+    shard.write_bytes(whole + b"x")
+    code, _, err = call("sweep", "resume", "out", "--workers", "1")
+    assert code == 3
+    assert "00001.parquet" in err
+    assert "make it again with --repair: omnidyn sweep resume out" in err
+    assert call("sweep", "resume", "out", "--workers", "1", "--repair")[0] == 0
+    assert shard.read_bytes() == whole
+    assert call("sweep", "status", "out", "--repair")[0] == 2
+
+
 def test_a_shard_that_failed_ends_with_4(spec, call):
     (spec / "spec.toml").write_text(
         SPEC.replace('"friction" = { factor', '"body.mass_kg" = { std = 2.0 }\n"friction" = { factor')

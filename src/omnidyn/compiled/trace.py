@@ -313,7 +313,6 @@ _NUMBERS: dict[str, Callable[[float, float], float]] = {
     "<=": operator.le,
     "==": operator.eq,
     "and": operator.and_,
-    "or": operator.or_,
     "pow": operator.pow,
     "max": lambda a, b: a if a >= b else b,
     "min": lambda a, b: a if a <= b else b,

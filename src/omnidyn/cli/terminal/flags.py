@@ -33,6 +33,7 @@ PLAIN_OPTIONS = (
     "plant",
     "pose",
     "rate",
+    "repair",
     "scheduler",
     "sensors",
     "shard",
