@@ -229,9 +229,7 @@ def _motors(center: Robot, drawn: Mapping[str, FloatArray], count: int) -> tuple
     names = {RESISTANCE: "resistance", TORQUE: "torque_constant", EMF: "emf_constant", GEAR: "gear_ratio"}
     base = {key: per_wheel(getattr(center.motor, name), wheels.count) for key, name in names.items()}
     base[RADIUS] = wheels.radii
-    resistance, torque, emf, gear, radius = (
-        drawn[key][:, None, None] if key in drawn else base[key] for key in MOTOR
-    )
+    resistance, torque, emf, gear, radius = (drawn[key][:, None, None] if key in drawn else base[key] for key in MOTOR)
     speed = rim_speed(wheels, np.eye(3)) / radius
     volts = np.eye(wheels.count)[None], 0.0 - emf * gear * speed
     per_volt, per_speed = (
