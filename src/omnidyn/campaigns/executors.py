@@ -35,7 +35,9 @@ Calls = Iterable[tuple[int, tuple[Any, ...]]]
 
 
 class ShardPool(Protocol):
-    """Where shards run."""
+    """Where shards run. workers: how many at once; 1 where nobody says."""
+
+    workers: int
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """What a function gives in a process that works; None where it fails."""
@@ -89,7 +91,7 @@ class Given:
     """An executor of the user: it gets all shards at once, and is left as it was."""
 
     def __init__(self, executor: Executor) -> None:
-        self.executor = executor
+        self.executor, self.workers = executor, getattr(executor, "_max_workers", 1)
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """What a function gives; None where it fails."""

@@ -1,6 +1,6 @@
 """Folder: what a campaign keeps on disk, so that nothing is lost, whatever ends.
 
-manifest.json            spec, hashes of inputs and task, version, samples, rows of a shard: written once
+manifest.json            spec, hashes of inputs and task, version, samples, rows of a shard: written again for more samples
 inputs/                  the files that the spec names, copied
 shards/00000.parquet     one shard: sample, what varied, what was measured. Written whole or not at all, never changed
 shards/00000.json        its record, written after it: a shard without one is not done. Who reads a shard compares them
@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from omnidyn.campaigns.spec import INPUTS, Spec, parse_spec
+from omnidyn.campaigns.spec import INPUTS, RANDOM, SOBOL, Spec, parse_spec
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.files import file_sha256, open_atomic, read_text, sha256, write_atomic
 from omnidyn.logs.readers.parquet import import_pyarrow
@@ -51,8 +51,18 @@ class Manifest(NamedTuple):
 
     @property
     def sha256(self) -> str:
-        """Of all of it: of what was computed, from what, and by what."""
-        return sha256(self.to_json())
+        """Of what was computed, from what, and by what: of all of it but the number of samples, which may grow."""
+        return sha256(self.with_samples(0).to_json())
+
+    def with_samples(self, samples: int) -> Manifest:
+        """The same with another number of samples."""
+        spec = {**self.spec, "samples": samples} if "samples" in self.spec else self.spec
+        return self._replace(samples=samples, spec=spec)
+
+    def can_grow_to(self, other: Manifest) -> bool:
+        """Whether another campaign is this one with more samples, of which the first are those of this one."""
+        goes_on = self.spec.get("sampling", SOBOL) in (SOBOL, RANDOM) and not self.spec.get("robot_draws")
+        return goes_on and other.samples > self.samples and not self.differences(other.with_samples(self.samples))
 
     @property
     def shards(self) -> int:
@@ -178,9 +188,10 @@ class Folder:
         """The spec of the campaign, files by their copies."""
         return parse_spec(self.manifest.spec, str(self.path / MANIFEST))
 
-    def begin(self, manifest: Manifest, inputs: Mapping[str, bytes]) -> Manifest:
+    def begin(self, manifest: Manifest, inputs: Mapping[str, bytes], block: int = 1) -> Manifest:
         """Make the folder for a campaign, or find the same campaign in it: its manifest, whose shards count.
 
+        One with more samples goes on where this one ended. block: samples that are moved together.
         Raises InputError where the folder holds another campaign (what differs), or anything else.
         """
         self.path.mkdir(parents=True, exist_ok=True)
@@ -195,16 +206,35 @@ class Folder:
             except InputError:
                 if not self.exists:  # else another part of the same campaign was quicker
                     raise
-        before = self.manifest
+        before = self._grown(self.manifest, manifest, block)
         if differences := before.differences(manifest):
             raise InputError(
                 f"the folder holds another campaign ({'; '.join(differences)})",
-                expected="the same spec, inputs, task and version",
+                expected="the same spec, inputs, task and version; of sobol and random sampling, more samples",
                 remedy="take a new folder",
                 where=str(self.path),
             )
         self.check_inputs()
         return before
+
+    def _grown(self, before: Manifest, wanted: Manifest, block: int) -> Manifest:
+        """The manifest, with more samples where these are wanted; shards that would hold more rows are to be made again.
+
+        Raises InputError while somebody works in the folder.
+        """
+        if not before.can_grow_to(wanted):
+            return before
+        after = before.with_samples(wanted.samples)
+        with self.locked(0, after.shards):
+            self.check_inputs()
+            whole = before.samples // block * block  # a block that was not whole is driven again
+            for shard in range(before.shards):
+                if after.rows(shard) != before.rows(shard) or before.rows(shard)[1] > whole:
+                    self.shard_path(shard, RECORD).unlink(missing_ok=True)
+                    self.shard_path(shard).unlink(missing_ok=True)
+            (self.path / MERGED).unlink(missing_ok=True)
+            write_atomic(self.path / MANIFEST, after.to_json(), force=True)
+        return after
 
     def _refuse_strangers(self, inputs: Mapping[str, bytes]) -> None:
         names = {name.partition("/")[0] for name in inputs} | {SHARDS, LOCK}
