@@ -9,6 +9,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -217,7 +218,7 @@ def test_a_latin_hypercube_and_a_folder_in_work_do_not_grow(tmp_path, threads):
 
 def test_the_time_left_leaves_out_what_each_worker_does_once(tmp_path, threads, monkeypatch):
     clock = iter(2.0 * k for k in range(100))  # read from the time on when both have ended their first shard
-    monkeypatch.setattr("omnidyn.campaigns.sweep.time.monotonic", lambda: next(clock))
+    monkeypatch.setattr("omnidyn.campaigns.sweep.time", SimpleNamespace(monotonic=lambda: next(clock)))
     heard = []
     sweep(SPEC | {"samples": 30}, tmp_path / "t", task=product, executor=threads, progress=heard.append)
     words = [report.phase for report in heard if report.phase.startswith("shard ")]
