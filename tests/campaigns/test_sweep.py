@@ -1,21 +1,23 @@
 """Campaigns: the same bytes however they are cut, killed and resumed; nothing lost, nothing computed twice."""
 
 import errno
+import logging
 import os
 import random
 import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from omnidyn import files
+from omnidyn.campaigns.executors import _quiet
 from omnidyn.campaigns.sweep import sweep
-from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.files import sha256
 from tests.support import campaign_tasks
 from tests.support.campaign_tasks import MARKS, mass, product, raising
@@ -111,6 +113,37 @@ def test_a_task_that_raises_or_ends_its_process_is_marked_and_the_others_go_on(t
     assert "in sample 5: task.a = " in campaign.status.failed[1]
     assert "the process that worked on this shard ended" in campaign.status.failed[2]
     assert campaign.verdict.code == "campaign_failed"
+
+
+class Ended(ThreadPoolExecutor):
+    """An executor whose machines are gone after the first call, as those of a Dask scheduler that ended."""
+
+    calls = 0
+
+    def submit(self, *arguments):
+        self.calls += 1
+        if self.calls > 1:
+            future = Future()
+            future.cancel()
+            future.set_running_or_notify_cancel()
+            return future
+        return super().submit(*arguments)
+
+
+def test_a_dead_scheduler_is_one_sentence_and_what_is_done_stays(tmp_path, threads):
+    with Ended(1) as pool, pytest.raises(OmnidynError, match="the executor has ended; got CancelledError; start it"):
+        sweep(SPEC, tmp_path / "x", task=product, executor=pool)
+    assert sweep(None, tmp_path / "x", task=product, executor=threads).status.complete
+
+
+def test_the_library_of_a_cluster_is_quiet_within_it(caplog):
+    log = logging.getLogger("distributed.client")
+    log.setLevel(logging.WARNING)
+    with _quiet("distributed"):
+        log.error("a traceback of forty lines")
+    assert not caplog.records
+    log.error("heard again")
+    assert len(caplog.records) == 1
 
 
 def test_a_full_disk_is_said_and_resumed_from(tmp_path, threads, monkeypatch, undisturbed):
