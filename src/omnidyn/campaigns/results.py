@@ -177,7 +177,10 @@ class Campaign(Displayable):
             "samples": status.samples,
         }
         code = "campaign_failed" if status.failed else "campaign_done" if status.complete else "campaign_open"
-        return Statement(code, WARNING if status.failed else NOTE, self.folder.spec.name, numbers)
+        bad = int(np.sum(~self.column("ok").astype(bool))) if VERDICT in self._measured else 0
+        if bad and code == "campaign_done":
+            code, numbers["failed"] = "fits_failed", bad
+        return Statement(code, WARNING if status.failed or bad else NOTE, self.folder.spec.name, numbers)
 
     def statements(self) -> list[Statement]:
         """Shards that failed, the last line of each traceback; the first fit of each verdict that does not stand."""
