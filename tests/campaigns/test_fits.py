@@ -113,7 +113,8 @@ def test_a_log_that_ends_too_early_is_not_ok_and_what_is_known_is_counted(folder
     whole = (folder / "gray" / "day0.csv").read_text().rstrip()
     (folder / "gray" / "day0.csv").write_text(whole[: whole.rindex(",")])
     (folder / "fits.toml").write_text(
-        'schema = 1\nrobot = "plain.toml"\n[identify]\nlogs = ["gray", "blue/day0.csv", "blue/day0a.csv"]\nquick = true\n'
+        'schema = 1\nrobot = "plain.toml"\n[identify]\nquick = true\n'
+        'logs = ["gray", "blue/day0.csv", "blue/day0a.csv"]\n'
     )
     assert main(["sweep", "fits.toml", "-o", "out", "--workers", "1"]) == 4
     said = capsys.readouterr()
@@ -122,7 +123,9 @@ def test_a_log_that_ends_too_early_is_not_ok_and_what_is_known_is_counted(folder
     cut = frame.loc["gray/day0.csv"]
     assert (cut.ok, cut.verdict) == (False, "fit_of_part")
     assert "ends in the middle of a row" in cut.words
-    assert cut["fit.friction.axes.coulomb[0]"] == pytest.approx(frame.loc["gray/day1.csv"]["fit.friction.axes.coulomb[0]"], rel=0.1)
+    assert cut["fit.friction.axes.coulomb[0]"] == pytest.approx(
+        frame.loc["gray/day1.csv"]["fit.friction.axes.coulomb[0]"], rel=0.1
+    )
     assert frame.ok.tolist() == [False, True, True, False]
     assert frame.known_share.tolist()[:3] == [1.0, 1.0, 1.0]
     assert np.isnan(frame.known_share.iloc[3])

@@ -19,7 +19,8 @@ from omnidyn.campaigns.batches import batch_columns, batched, block_rows
 from omnidyn.campaigns.design import sample_count
 from omnidyn.campaigns.executors import ShardPool, opened
 from omnidyn.campaigns.fits import hashes_of, with_logs
-from omnidyn.campaigns.folder import SAMPLE, Folder, Manifest, as_columns, as_table
+from omnidyn.campaigns.folder import SAMPLE, Folder, as_columns, as_table
+from omnidyn.campaigns.manifest import Manifest
 from omnidyn.campaigns.results import Campaign
 from omnidyn.campaigns.spec import INPUTS, Spec, load_spec, parse_spec, spec_tables
 from omnidyn.campaigns.tasks import CampaignSample, Function, LoadedSpec

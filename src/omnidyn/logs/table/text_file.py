@@ -162,7 +162,9 @@ class TextFile:
                 )
             if len(text) < len(block) and not zeros:
                 zeros = True
-                self.notes.append(cut_short("zero bytes at the end, as a recorder leaves that lost its power, were left out"))
+                self.notes.append(
+                    cut_short("zero bytes at the end, as a recorder leaves that lost its power, were left out")
+                )
             if text:
                 yield text
         if decoder is not None:
