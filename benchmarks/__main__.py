@@ -11,7 +11,6 @@ from benchmarks.publish import publish
 
 NAMES = {
     "house": "the house in figures: lines, files per folder, parameter lists, what stands twice, circles",
-    "path_of_a_value": "functions and rooms that hold a voltage on its way from `simulate` to the Run",
     "accuracy": "exact engine against 50 digits: Table 3 and 50 random robots, 10,000 steps each (about a minute)",
     "simulate": "one robot, 10 s at 1 kHz: time and error beside scipy's LSODA with tanh friction",
     "inductance": "what winding inductance costs: exact engine with L > 0 beside L = 0, 10 s at 1 kHz",
