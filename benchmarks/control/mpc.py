@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 import omnidyn
+from benchmarks.control.araujo import Araujo
 from benchmarks.control.mpc_c import c_rows
 from benchmarks.control.mpc_peers import ipopt_errors, peer_rows
 from benchmarks.size import scaled
 from benchmarks.table import Table, machine, one_core
-from omnidyn.control.araujo import Araujo
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.mpc.settings import Settings
 from omnidyn.control.paths.path import path
