@@ -2,8 +2,8 @@
 
 import pytest
 
-from benchmarks.check import CODES
-from benchmarks.check_faults import FAULTS, draw
+from benchmarks.logs.check import CODES
+from benchmarks.logs.check_faults import FAULTS, draw
 from omnidyn.findings.check import check
 from omnidyn.statement import NOTE
 
