@@ -149,6 +149,7 @@ class Environments:
         dtype: Of all numbers, float32 or float64.
         threads: That share a step.
         seed: Of the pool that ranges draw from.
+        poses: Whether poses are kept in the task "velocity" too, which asks for none.
 
     was_reset: whether any reset has been.
     """
@@ -165,6 +166,7 @@ class Environments:
         dtype: Any = np.float32,
         threads: int = 1,
         seed: int = 0,
+        poses: bool = False,
     ) -> None:
         setting = setting or Setting()
         given = [robots] if isinstance(robots, Robot) else list(robots)
@@ -185,7 +187,7 @@ class Environments:
         else:
             self.pool = drawn_pool(given, setting.randomise, setting.uncertainty, seed)
             check_robots(self.pool.robots)
-        self.wheels = given[0].wheels.count
+        self.wheels, self._poses = given[0].wheels.count, poses
         self.columns = columns_of(TASKS[setting.task], self.wheels)
         self.numbers = self._numbers(given[0], path)
         self.state = new_state(self.numbers, count, self.wheels)
@@ -216,7 +218,7 @@ class Environments:
         substeps = np.array([count * -(-setting.substeps // sum(ticks)) for count in ticks])
         if not looped:
             substeps = np.full(len(shares), setting.substeps)
-        travels = task != VELOCITY or sensors.averaged
+        travels = task != VELOCITY or sensors.averaged or self._poses
         voltage = np.ones(robot.wheels.count) if looped else largest_voltage(robot)
         law = law_of(robot) or EXACT_LAW
         halves = np.full(len(shares), 2 if travels else 1)
@@ -435,8 +437,13 @@ class Environments:
 
     @property
     def pose(self) -> FloatArray:
-        """The true poses; zeros in the task "velocity", which asks for none. Shape (count, 3)."""
+        """The true poses; zeros in the task "velocity" without `poses`. Shape (count, 3)."""
         return self._by_robot(self.state.pose)
+
+    @property
+    def goal(self) -> FloatArray:
+        """The goals: twists or poses; of a path how far beside it robots began. Shape (count, 3)."""
+        return self._by_robot(self.state.goal)
 
     @property
     def steps_done(self) -> Any:

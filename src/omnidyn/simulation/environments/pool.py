@@ -215,7 +215,15 @@ def rows_of(
     if law == EXACT_LAW:
         rate = parameters.damping / mass
         held = [-np.expm1(-rate * length) / rate for length in pieces]
-        columns = [parameters.coulomb / mass, parameters.breakaway / mass, rate, 1.0 / mass, *held, between, *(push / mass)]
+        columns = [
+            parameters.coulomb / mass,
+            parameters.breakaway / mass,
+            rate,
+            1.0 / mass,
+            *held,
+            between,
+            *(push / mass),
+        ]
     else:
         frame = np.zeros((3 * len(pieces), parameters.count))
         frame[0] = np.where(turning, parameters.body_mass, 0.0)
