@@ -14,13 +14,13 @@ robot = omnidyn.load_robot("axebot")
 envs = RobotVectorEnv(256, robot, "path", path="eight", duration=2.0, autoreset_mode="SameStep")
 model = PPO(
     "MlpPolicy",
-    VecNormalize(sb3_env(envs)),
+    VecNormalize(sb3_env(envs), gamma=0.95),
     n_steps=32,
     batch_size=1024,
     n_epochs=5,
-    gamma=0.9,
-    learning_rate=1e-3,
-    policy_kwargs={"net_arch": [32], "log_std_init": -1.0},
+    gamma=0.95,
+    learning_rate=lambda left: 1e-3 * left,
+    policy_kwargs={"net_arch": [32], "log_std_init": -1.5},
     seed=0,
     device="cpu",
 )
