@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
 
 import omnidyn
 from omnidyn.errors import InputError
@@ -160,3 +161,18 @@ def test_an_environment_pickles_and_goes_on_with_the_same_bits(threads):
         np.testing.assert_array_equal(one, other)
     envs.close()
     copied.close()
+
+
+def test_what_the_page_says_of_wrappers_and_ends_in_the_same_step_is_so():
+    envs = RecordEpisodeStatistics(RobotVectorEnv(2, duration=0.1, autoreset_mode="SameStep"))
+    envs.reset(seed=1)
+    rewards, returns = [], []
+    for _ in range(10):
+        _, reward, _, truncated, infos = envs.step(np.full((2, 3), 0.3))
+        rewards.append(reward)
+        if truncated.any():
+            returns.append(infos["episode"]["r"])
+    np.testing.assert_allclose(returns, np.reshape(rewards, (2, 5, 2)).sum(axis=1), rtol=1e-6)
+    with pytest.raises(ValueError, match="SAME_STEP"):
+        NormalizeObservation(RobotVectorEnv(2, autoreset_mode="SameStep"))
+    NormalizeObservation(RobotVectorEnv(2))
