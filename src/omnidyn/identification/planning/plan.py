@@ -328,11 +328,9 @@ class _Planner:
 
     def reach(self, programs: Sequence[FloatArray]) -> tuple[float, float]:
         """How far the robots go along x and along y at most [m]: one program after the other, from the middle each."""
-        ends = [
-            np.abs(driven(robot, share, self.dt).pose[:, :2]).max(axis=0) for robot in self.robots for share in programs
-        ]
-        x, y = np.max(ends, axis=0)
-        return float(x), float(y)
+        runs = [driven(robot, share, self.dt) for robot in self.robots for share in programs]
+        places = np.abs(np.concatenate([np.asarray(run.pose)[:, :2] for run in runs]))
+        return float(places[:, 0].max()), float(places[:, 1].max())
 
     def predicted(self, made: _Programs, area: tuple[float, float], reach: tuple[float, float]) -> Plan:
         """The plan, with what the fit would say of its log for each robot that may be meant."""
