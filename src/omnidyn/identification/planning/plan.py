@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,6 +51,7 @@ SHORTEST, LONGEST = 20.0, 3600.0  # [s]
 SLOWEST, FASTEST = 5.0, 1000.0  # [Hz]
 TELLS_NOTHING = 3.0  # half an interval, of the number, from which on no digit is shown
 DUTY = "duty"
+DOUBTED = ("gain", "dead_band")  # what a fit may need beside the numbers of the file: moves must tell that apart too
 SEED = 0  # of the robots and of the noise
 REST = 1.0  # [s] before the first move
 
@@ -194,7 +195,7 @@ def plan(
 ) -> Plan:
     """Which minute of driving tells most about a robot, and how much that is.
 
-    Moves from rest to rest, each followed by its mirror image, inside a room; first a spin and slow ramps, then those
+    Moves from rest to rest, each followed by its mirror image, inside a room; first slow ramps, then those
     that tell most for their time. What is predicted is what `identify` would say of a log of it: the fit's own problem,
     at robots that may be meant, in the middle and at the worst of ten. The numbers that the fit may add by itself, such
     as a latency, are not counted.
@@ -287,7 +288,8 @@ class _Planner:
         candidates = [one.move for one in moves]
         rng = np.random.default_rng(SEED)
         runs = [self._recorded(self.robot, move.both(self.robot, self.dt), rng) for move in candidates]
-        names, information = information_of(runs, self.robot, self.question)
+        asked = replace(self.question, nuisances=DOUBTED)
+        names, information = information_of(runs, self.robot, asked)
         score = self._score(names, aim)
         begun = information[[candidates.index(move) for move in opening]].sum(axis=0)
         time = (1.0 - HELD_OUT_SHARE) * seconds - REST - sum(move.duration for move in opening)
@@ -297,7 +299,7 @@ class _Planner:
             kept = np.flatnonzero(rng.random(len(candidates)) < KEPT) if k else np.arange(len(candidates))
             order = [int(kept[i]) for i in chosen([candidates[j] for j in kept], information[kept], time, score, begun)]
             made = self._programs(opening, [candidates[j] for j in order], seconds)
-            predictions = told_by([self._recorded(self.robot, made.share, rng)], self.robot, self.question)
+            predictions = told_by([self._recorded(self.robot, made.share, rng)], self.robot, asked)
             of_plan = _of(predictions, aim)
             if best is None or of_plan < best_score:
                 best, best_score = made, of_plan
@@ -371,10 +373,10 @@ def _of(predictions: Prediction, aim: str) -> float:
 
 
 def _opening(moves: Sequence[TriedMove]) -> list[PlannedMove]:
-    """A spin, which needs no room, and slow ramps through the dead zone along each axis, the least that move it."""
+    """Slow ramps through the dead zone, the least that move it: a spin first, which needs no room, then x and y."""
     opening = []
-    for direction, shape in ((TURN, STEP), (TURN, RAMP), (FORWARD, RAMP), (SIDEWAYS, RAMP)):
-        fitting = [one.move for one in moves if one.move.direction == direction and one.move.shape == shape]
+    for direction in (TURN, FORWARD, SIDEWAYS):
+        fitting = [one.move for one in moves if one.move.direction == direction and one.move.shape == RAMP]
         longest = max((move.seconds for move in fitting), default=0.0)
         opening += sorted((move for move in fitting if move.seconds == longest), key=lambda move: move.level)[:1]
     return opening
