@@ -254,15 +254,15 @@ class Readings:
         self._angles = self._angles + wheel_speed(self._wheels, moved) + 0.5 * seconds * (slipping + self._slipping)
         self._slipping, self._seconds = slipping, seconds
         counted = self._angles if self._turn is None else np.floor(self._angles / self._turn) * self._turn
-        way = twist_from_wheel_speed(self._believed, counted - self._counted)
+        travel = twist_from_wheel_speed(self._believed, counted - self._counted)
         if self._kit.sensors.has_gyroscope:
             drawn = (self._kit.sensors.gyro_noise or 0.0) * float(self._random.standard_normal())
-            way[2] = turned + seconds * (self._bias + drawn)
-        self._counted_pose = self._counted_pose + body_to_world(self._counted_pose[2] + 0.5 * way[2]) @ way
+            travel[2] = turned + seconds * (self._bias + drawn)
+        self._counted_pose = self._counted_pose + body_to_world(self._counted_pose[2] + 0.5 * travel[2]) @ travel
         self._counted = counted
-        self._twist = way / seconds if self._kit.sensors.twist == MEAN else np.array(self._live.twist)
+        self._twist = travel / seconds if self._kit.sensors.twist == MEAN else np.array(self._live.twist)
         if self._kit.sensors.has_gyroscope:
-            self._twist[2] = way[2] / seconds
+            self._twist[2] = travel[2] / seconds
         self._moments.append(now)
         oldest = now.t - self._kit.sensors.pose_delay - 1.0 / (self._kit.sensors.pose_rate or math.inf)
         while len(self._moments) > 2 and self._moments[1].t <= oldest:
@@ -308,6 +308,6 @@ class Readings:
         return first.pose + rise * (last.pose - first.pose) + bend
 
 
-def told(robot: Robot, wanted: Any) -> Robot:
+def with_sensors(robot: Robot, wanted: Any) -> Robot:
     """The robot that knows which sensors are asked for; as it is where none are."""
     return robot if wanted is None else robot.replace(sensors=instruments(wanted, robot).sensors)

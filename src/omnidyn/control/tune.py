@@ -24,7 +24,7 @@ from omnidyn.control.closed_loop import Circumstances, Push, told_of_loop, track
 from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
 from omnidyn.control.demand import path_demand
 from omnidyn.control.feedforward import DT
-from omnidyn.control.instruments import Instruments, instruments, told
+from omnidyn.control.instruments import Instruments, instruments, with_sensors
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import is_several
@@ -247,7 +247,7 @@ def tune(
     kinds = (Path, str) if isinstance(path, Robot) else object
     check_order("tune(robot, path, controller)", (robot, Robot), (paths, kinds), (controller, str))
     _check_counts(draws, evaluations, path is None or paths)
-    kit, robot = instruments(sensors, robot), told(robot, sensors)
+    kit, robot = instruments(sensors, robot), with_sensors(robot, sensors)
     seconds = SECONDS if path is None and duration is None else duration
     around = Circumstances(dt, seconds, min(SKIP, 0.5 * (seconds or SECONDS)), noise, delay, seed, sensors=kit)
     spec = controller_spec(controller)

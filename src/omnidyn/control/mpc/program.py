@@ -46,10 +46,10 @@ def make_costs(numbers, settings, estimate, program, preview, start, add):
             stage[k, WEIGHT + i], stage[k, PULL + i] = weight, -weight * goal
         now, then = vector(preview, row, 3), vector(preview, row + 1, 3)
         middle = 0.5 * (now[0] + then[0]), 0.5 * (now[1] + then[1]), 0.5 * (now[2] + then[2])
-        way = homeward(preview, row, add, program.x, k)
-        put3(stage, k, WAY, way)
-        way = plus(middle, way)
-        drive = plus(mv(feed, minus(then, mv(decay, now))), friction_at(linear, levels, scale, way, 1.0, False)[0])
+        velocity = homeward(preview, row, add, program.x, k)
+        put3(stage, k, WAY, velocity)
+        velocity = plus(middle, velocity)
+        drive = plus(mv(feed, minus(then, mv(decay, now))), friction_at(linear, levels, scale, velocity, 1.0, False)[0])
         drive = minus(drive, push)
         if linear[0, TURNING] != 0.0:
             drive = minus(drive, frame_at(linear, middle)[0])

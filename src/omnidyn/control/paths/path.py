@@ -289,7 +289,7 @@ class Goal(Path):
     def at(self, t: ArrayLike) -> Reference:
         """See Path."""
         time = np.asarray(t, dtype=float)
-        way = self.goal - self.start
+        offset = self.goal - self.start
         if self.travel == 0.0:
             rest = np.zeros((*time.shape, 3))
             return Reference(np.broadcast_to(self.goal, rest.shape).copy(), rest, rest.copy())
@@ -297,4 +297,4 @@ class Goal(Path):
         part = p**3 * (10.0 - 15.0 * p + 6.0 * p**2)
         rate = 30.0 * p**2 * (1.0 - p) ** 2 / self.travel
         change = 60.0 * p * (1.0 - p) * (1.0 - 2.0 * p) / self.travel**2
-        return Reference(self.start + part * way, rate * way, change * way)
+        return Reference(self.start + part * offset, rate * offset, change * offset)
