@@ -5,7 +5,7 @@ import pytest
 
 import omnidyn
 from omnidyn.control.pid import Pid
-from omnidyn.control.speed_loop import SWIFT, check_faster, check_integral, pole_rate, pose_gains, speed_gains
+from omnidyn.control.pole_placement import SWIFT, check_faster, check_integral, pole_rate, pose_gains, speed_gains
 from omnidyn.errors import InputError
 
 RATES = np.array([6.7, 2.0, 11.0])

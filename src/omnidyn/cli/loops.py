@@ -69,7 +69,8 @@ def track(
     keep_inputs([], [robot, plant], files, out, report, gif)
     from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
     from omnidyn.control.controllers import several
-    from omnidyn.control.instruments import instruments, with_sensors
+    from omnidyn.control.instruments import instruments
+    from omnidyn.control.readings import with_sensors
     from omnidyn.control.tracking import trackings_document
     from omnidyn.model.vary import vary_as
 

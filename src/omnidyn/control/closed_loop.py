@@ -15,9 +15,10 @@ from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import OK, Controller
 from omnidyn.control.controllers import ControllerFile, controller_named, told_apart
 from omnidyn.control.feedforward import DT, check_dt
-from omnidyn.control.instruments import MOST_JITTER, Instruments, Readings, instruments, with_sensors
+from omnidyn.control.instruments import MOST_JITTER, Instruments, instruments
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
+from omnidyn.control.readings import Readings, with_sensors
 from omnidyn.control.tracking import Tracking, Trackings
 from omnidyn.errors import InputError
 from omnidyn.model.drive import DUTY, SPEED

@@ -28,15 +28,8 @@ from omnidyn.control.controller import WHEEL_SPEED, Guarded
 from omnidyn.control.feedforward import DT, LoopCommands, Volts, check_delay, check_dt, lateness
 from omnidyn.control.paths.ahead import Ahead
 from omnidyn.control.paths.motion import Path
-from omnidyn.control.speed_loop import (
-    MOST_STEPS,
-    SWIFT,
-    check_faster,
-    check_integral,
-    place_gains,
-    pole_rate,
-    pose_gains,
-)
+from omnidyn.control.pole_placement import SWIFT, check_faster, check_integral, place_gains, pole_rate, pose_gains
+from omnidyn.control.speed_loop import MOST_STEPS
 from omnidyn.control.swing import Swing
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.inverse import Effort

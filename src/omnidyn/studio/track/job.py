@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 import omnidyn
-from omnidyn.control.instruments import with_sensors
-from omnidyn.control.paths.curve import path_of_file, through
 from omnidyn.control.paths.motion import Path
+from omnidyn.control.paths.polyline import path_of_file, through
+from omnidyn.control.readings import with_sensors
 from omnidyn.control.tracking import Trackings, trackings_document
 from omnidyn.document import plain
 from omnidyn.model.robot import Robot
