@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.stagger import OFF_AZIMUTH, OFF_RMS, robot_of, seen
+from benchmarks.logs.stagger import OFF_AZIMUTH, OFF_RMS, robot_of, seen
 from omnidyn.findings.check import check
 from omnidyn.logs.geometry import wheel_geometry
 from omnidyn.logs.read_log import load_log

@@ -2,7 +2,7 @@
 
 Where a row is tested at more depth: 13, 14, 17, 20 test_read_log.py; 19 test_guess.py, check/test_time_base.py;
 18 check/test_time_base.py, comparison/test_replay.py; 21 check/test_time_base.py; 22-26 check/test_scale.py,
-check/test_values.py, check/test_wiring.py; 27, 28 check/test_motion.py; 29 benchmarks/check.py.
+check/test_values.py, check/test_wiring.py; 27, 28 check/test_motion.py; 29 benchmarks/logs/check.py.
 """
 
 import numpy as np

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks import real_fit, udea
+from benchmarks.real import real_fit, udea
 from omnidyn import MotorFit, identify
 from omnidyn.identification.motors.choice import choose_motor, fit_rmse
 from omnidyn.identification.motors.fit import fit_motor

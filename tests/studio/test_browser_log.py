@@ -8,7 +8,7 @@ import pytest
 import omnidyn
 from omnidyn.model.keys import Key, find_key
 from tests.support.axebot_logs import excitation
-from tests.support.pages import command, drop, numbers, pick, shown, tab, verdict
+from tests.support.pages import command, drop, load_again, numbers, pick, shown, tab, verdict, write_log
 from tests.support.pushed_logs import clean_log
 
 
@@ -153,3 +153,25 @@ def test_the_robot_is_drawn_while_its_sizes_are_typed(browser, tmp_path, monkeyp
     made = page.evaluate(drawn)
     assert [angle for angle, _, _ in made] == pytest.approx(wheels.azimuth_deg)
     assert [radius for _, _, radius in made] == pytest.approx(np.asarray(wheels.robot_radius))
+
+
+def test_nothing_moves_under_the_mouse_while_it_is_drawn_or_opened(browser, tmp_path):
+    _, page = browser.start(write_log(tmp_path / "log.csv"))
+    verdict(page)
+    waiting = []
+    page.route("**/series/*", lambda route: waiting.append(route))  # signals come late
+    load_again(page)
+    heights = """name => new Promise(done => { const seen = new Set(), element = document.querySelector(name);
+        new ResizeObserver(() => seen.add(element.clientHeight)).observe(element);
+        setTimeout(() => done([...seen].filter(height => height)), 600); })"""
+    (before,) = page.evaluate(heights, "omni-plot canvas")
+    for route in waiting:
+        route.continue_()
+    page.wait_for_function("document.querySelector('omni-plot').frames > 0")
+    assert page.evaluate(heights, "omni-plot canvas") == [before]
+    body = ".box:has(.columns) .q-expansion-item__content"
+    page.evaluate(f"name => {{ window.seen = ({heights})(name); }}", body)
+    page.get_by_text("Columns and units").click()
+    assert len(page.evaluate("window.seen")) == 1
+    page.get_by_label("vx_m_s is").click()
+    assert page.get_by_role("option").count() > 30  # all rows: a list that gets more of them while it is scrolled jumps

@@ -1,8 +1,7 @@
-"""Elements of a page that are made in several places: a verdict, a plot, a table, a row of the map of columns."""
+"""Elements of a page that are made in several places: a verdict, a table, a row of the map of columns."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -19,24 +18,6 @@ def verdict(severity: str, words: str, name: str = "verdict") -> None:
     with ui.row().classes(f"verdict {severity}").props(f"id={name} role=status"):
         ui.label(MARK[severity]).classes("mark")
         ui.label(words).classes("text")
-
-
-def plot(
-    series: str, spans: list[list[Any]], name: str = "signals.png", other: str = "", offset: float = 0.0
-) -> ui.element:
-    """A picture of signals over time.
-
-    Args:
-        series: id of the signals.
-        spans: what is shaded: number of a finding, its severity, from, to [s], its subject.
-        name: of the file that the picture is saved as.
-        other: id of a second series, drawn over the first.
-        offset: that is added to the times of the second [s].
-    """
-    plot = ui.element("omni-plot")
-    plot._props |= {"data-series": series, "data-spans": json.dumps(spans), "data-name": name}
-    plot._props |= {"data-other": other, "data-offset": str(offset)} if other else {}
-    return plot
 
 
 def table(table: dict[str, Any], name: str) -> None:

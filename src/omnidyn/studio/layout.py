@@ -71,6 +71,8 @@ def show(studio: Studio) -> None:
     """Lay out a page."""
     ui.add_head_html(HEAD)
     ui.colors(primary="#0b57a4")
+    # What moves between press and release of the mouse loses the click: a list is there at once, with all its rows
+    ui.select.default_props("transition-duration=0 virtual-scroll-slice-size=200")
     session, client = studio.session, ui.context.client
     page = Page(session)
     tabs = studio.tabs(page)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -74,6 +75,24 @@ class Page:
             self.part(words, part, progress_of(part))
             self.part(button, part)
         self.part(bar, part, progress_of(part))
+
+    def plot(
+        self, series: str, spans: list[list[Any]], name: str = "signals.png", other: str = "", offset: float = 0.0
+    ) -> ui.element:
+        """A picture of signals over time; it takes its place at once, so that nothing below it moves when it is drawn.
+
+        Args:
+            series: id of the signals.
+            spans: what is shaded: number of a finding, its severity, from, to [s], its subject.
+            name: of the file that the picture is saved as.
+            other: id of a second series, drawn over the first.
+            offset: that is added to the times of the second [s].
+        """
+        plot = ui.element("omni-plot")
+        plot._props |= {"data-series": series, "data-spans": json.dumps(spans), "data-name": name}
+        plot._props |= {"data-panels": str(len(self.session.series[series].meta["panels"]))}
+        plot._props |= {"data-other": other, "data-offset": str(offset)} if other else {}
+        return plot
 
     def robot_choice(self) -> None:
         """The robot of the session, and a place to drop a robot file."""

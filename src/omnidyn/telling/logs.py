@@ -85,8 +85,8 @@ REASONS = {
     "turns_in_degrees": Reason(
         either(
             "unit",
-            "it jumps by 360 as degrees do, not radians",
-            "no unit is given, and it jumps by 360 as degrees do",
+            "it jumps as degrees do, not radians",
+            "no unit is given, and it jumps as degrees do",
         )
     ),
     "beyond_range": Reason(_beyond_range),

@@ -227,8 +227,6 @@ def test_controllers_and_robots_without_c_are_refused_by_name(monkeypatch):
     monkeypatch.setitem(NAMES, "new", "omnidyn.control.pid:Pid")
     with pytest.raises(UnsupportedError, match="the controller new: there is no C code of it"):
         c_controller(ROBOT, controller="new")
-    with pytest.raises(UnsupportedError, match="the controller araujo: it is there for comparison alone"):
-        c_controller(ROBOT, controller="araujo")
     monkeypatch.setitem(CONTROLLERS, "speed", Cell(REFUSES, "no C today"))
     with pytest.raises(UnsupportedError, match=r"the controller speed: no C today.*expected feedforward or pid or mpc"):
         c_controller(ROBOT, controller="speed")

@@ -8,7 +8,7 @@ from nicegui import ui
 
 from omnidyn.studio.compare.job import PICTURE
 from omnidyn.studio.compare.state import FIT, Comparing
-from omnidyn.studio.elements import document, plot, verdict
+from omnidyn.studio.elements import document, verdict
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import COMPARE, COMPARE_START, DRIFT, LOGS, ROBOT
 
@@ -89,7 +89,7 @@ class CompareTab:
             ui.toggle(result["series"], value=names[0], on_change=lambda e: show(e.value)).props("no-caps")
         if names:
             ui.label("Free run: the model gets the inputs only").classes("title")
-            signals = plot(task.series[names[0]], [], "compare.png")
+            signals = self.page.plot(task.series[names[0]], [], "compare.png")
 
             def show(name: str) -> None:
                 signals.props["data-series"] = task.series[name]

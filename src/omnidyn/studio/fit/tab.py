@@ -7,7 +7,7 @@ from collections.abc import Callable
 from nicegui import ui
 
 from omnidyn.model.wheels import ROBOT_RADII, WHEEL_RADII
-from omnidyn.studio.elements import plot, table, verdict
+from omnidyn.studio.elements import table, verdict
 from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import FIT, FREE, LOGS, ROBOT
@@ -148,7 +148,7 @@ class FitTab:
             ui.label(f"→ {words}").classes("text")
         if SERIES in fit.series:
             ui.label("Free run: the model gets the inputs only").classes("title")
-            plot(fit.series[SERIES], [], "free-run.png")
+            self.page.plot(fit.series[SERIES], [], "free-run.png")
         with self.page.box(f"Warnings and notes ({len(result['warnings'])})"):
             for warning in result["warnings"]:
                 ui.label(f"{warning['severity']}: {warning['text']}").classes("text")

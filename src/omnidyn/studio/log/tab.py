@@ -9,7 +9,7 @@ from nicegui import ui
 
 from omnidyn.studio import calls
 from omnidyn.studio.calls import LogFile
-from omnidyn.studio.elements import MARK, UNUSED, column_row, plot, verdict
+from omnidyn.studio.elements import MARK, UNUSED, column_row, verdict
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import LOGS, PROGRESS
 
@@ -90,7 +90,7 @@ class LogTab:
             self._second(log, others)
         other = self.session.logs[log.other].series if log.other else ""
         name = f"{Path(log.label).stem}.png"
-        picture = plot(log.series, spans, name, other, log.offset)
+        picture = self.page.plot(log.series, spans, name, other, log.offset)
         picture._props["data-words"] = self.session.logs[log.other].label if log.other else ""
         picture.on("moved", lambda event: self._move(log, event.args["detail"]), args=["detail"])
 

@@ -24,6 +24,7 @@ const wire = {
 const views = new Map(); // series -> what is looked at of it: the page is laid out anew where something changes
 const HINT = 'Drag to pan, wheel or + and - to zoom';
 const TOP = 20, PANEL = 110, GAP = 24, BOTTOM = 38;
+const tall = (panels) => TOP + panels * (PANEL + GAP) - GAP + BOTTOM;
 
 // A frame of the server: its head, and its numbers
 function frame(data) {
@@ -76,6 +77,7 @@ class Plot extends HTMLElement {
     this.story = make('div', this, { className: 'story', hidden: true });
     this.story.setAttribute('role', 'status');
     this.canvas = make('canvas', this, { tabIndex: 0 });
+    this.canvas.style.height = `${tall(+this.dataset.panels)}px`; // its place, before there is anything to draw
     this.canvas.setAttribute('role', 'img');
     this.canvas.setAttribute('aria-label', 'Signals over time');
     this.frames = 0;
@@ -169,7 +171,7 @@ class Plot extends HTMLElement {
   render() {
     if (!this.meta || !this.canvas) return;
     const panels = this.meta.panels, width = this.clientWidth;
-    const height = TOP + panels.length * (PANEL + GAP) - GAP + BOTTOM;
+    const height = tall(panels.length);
     const g = sharp(this.canvas, width, height), x = (t) => LEFT + (t - this.view[0]) / (this.view[1] - this.view[0]) * this.inner();
     let first = 0;
     panels.forEach((panel, k) => {

@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 
 from omnidyn.control.paths.path import OPTIONS
-from omnidyn.studio.elements import document, plot, verdict
+from omnidyn.studio.elements import document, verdict
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import PATH, ROBOT, TRACK, TRACK_START
 from omnidyn.studio.series import SERIES
@@ -123,7 +123,7 @@ class TrackTab:
                 ui.link(f"Run of {name} (CSV)", f"/track/run-{k + 1}.csv").props("download")
             if result["drawn"]:
                 ui.link("Drawn path (CSV)", f"/track/{DRAWN}").props("download")
-        plot(task.series[SERIES], [], "track-signals.png")
+        self.page.plot(task.series[SERIES], [], "track-signals.png")
         self.page.calls(task.command, task.python, "call-track")
 
 
