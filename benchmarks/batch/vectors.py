@@ -51,8 +51,8 @@ def gymnax_run() -> tuple[Callable[[], Any], int] | None:
     actions = jax.random.uniform(jax.random.PRNGKey(1), (100, ENVIRONMENTS, 1), minval=-1.0)
 
     def one(state: Any, action: Any) -> Any:
-        _, state, reward, _, _ = jax.vmap(environment.step, in_axes=(0, 0, 0, None))(keys, state, action, parameters)
-        return state, reward
+        step = jax.vmap(environment.step, in_axes=(0, 0, 0, None))(keys, state, action, parameters)
+        return step[1], step[2]
 
     run = jax.jit(lambda: jax.lax.scan(one, start, actions)[1])
     return lambda: np.asarray(run()), 100

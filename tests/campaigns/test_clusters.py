@@ -57,7 +57,7 @@ def test_a_job_of_kubernetes_runs_every_part_once(told):
     assert parts == [f"{k}/{count}" for k in range(1, int(count) + 1)]
 
 
-JOBLIB = '''
+JOBLIB = """
 from joblib.externals.loky import get_reusable_executor
 
 from omnidyn.campaigns.sweep import sweep
@@ -66,7 +66,7 @@ from tests.support.campaign_tasks import product
 
 if __name__ == "__main__":
     sweep(SPEC, {folder!r}, task=product, executor=get_reusable_executor(2))
-'''
+"""
 
 
 def test_an_executor_of_joblib_gives_the_same_bytes(tmp_path):
