@@ -38,9 +38,9 @@ class FixedNumbers(NamedTuple):
 
     task, autoreset: as above. substeps, ticks: of a piece, a number per piece; ticks: of a speed loop, 0 without one.
     largest: set point of an action of 1 [rad/s], (wheels,). halves: 2 of each substep with poses, or 1, per piece.
-    limit: steps of an episode. lags, shares: a row per piece of a step, by how many steps the voltage that acts in it is late,
-    and its length as a share. averaged: whether measured speeds are means over the step, kept: share of the last one
-    that a low pass keeps. travels: whether means and poses are needed; pushed: whether there are pushes.
+    limit: steps of an episode. lags, shares: a row per piece of a step, by how many steps the voltage that acts in it
+    is late, and its length as a share. averaged: whether measured speeds are means over the step, kept: share of the
+    last one that a low pass keeps. travels: whether means and poses are needed; pushed: whether there are pushes.
     late, hold [steps]: age of a new pose, and from one to the next. dead: band of the driver, as a share of the largest
     voltage, (wheels,). push: largest wrench [N, N, N m], (3,); interval [steps]: from one to the next, 0: for an
     episode. spread: largest goal or start, (3,). sizes: of the pool (startup, reset, interval). pool: numbers of
