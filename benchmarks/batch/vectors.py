@@ -104,9 +104,9 @@ def column() -> dict[str, float]:
 
 
 def main() -> None:
-    """Measure the columns by turns, three times; print the least of each."""
+    """Measure the columns by turns, twice; print the least of each."""
     found: dict[str, dict[str, float]] = {name: {} for name in COLUMNS}
-    for _ in range(3):
+    for _ in range(2):
         for name, told in COLUMNS.items():
             said = subprocess.run(
                 [sys.executable, "-m", "benchmarks.batch.vectors", "--column"],
