@@ -22,7 +22,7 @@ from tests.support.controlled import CController
 from tests.support.exported import STRICT
 
 MOST_MEMORY, MOST_WORSE = 11 * 1024, 1.01
-WITHOUT = [f"-DOMNIDYN_{name}=0" for name in ("MOST_BRIDGED", "ELAPSED", "FEW_KNOCKS")]
+WITHOUT = [f"-DOMNIDYN_{name}=0" for name in ("MOST_BRIDGED", "ELAPSED", "FEW_KNOCKS", "SWING")]
 DRAWS, NOISE = 12, 1e-6  # [m/s]
 
 

@@ -35,6 +35,7 @@ PUBLIC = [
     "load_robot",
     "path",
     "path_demand",
+    "plan",
     "preset_names",
     "read_commands",
     "read_log",

@@ -15,9 +15,10 @@ from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import OK, Controller
 from omnidyn.control.controllers import ControllerFile, controller_named, told_apart
 from omnidyn.control.feedforward import DT, check_dt
-from omnidyn.control.instruments import MOST_JITTER, Instruments, Readings, instruments, told
+from omnidyn.control.instruments import MOST_JITTER, Instruments, instruments
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
+from omnidyn.control.readings import Readings, with_sensors
 from omnidyn.control.tracking import Tracking
 from omnidyn.errors import InputError
 from omnidyn.model.drive import DUTY, SPEED
@@ -148,7 +149,7 @@ def track(
     kinds = (Path, Run, str) if isinstance(path, Robot) else object
     check_order("track(robot, path, controller)", (robot, Robot), (path, kinds), (controller, object))
     around = circumstances(plant or robot, **options)
-    believed = told(robot, options.get("sensors"))
+    believed = with_sensors(robot, options.get("sensors"))
     follow = path_named(path)
     wanted = list(controller) if isinstance(controller, list | tuple) else [controller]
     if not wanted:
