@@ -4,6 +4,6 @@ Read in this order: controller (the one contract, a numbered list), paths/ (wher
 of a robot), feedforward (the inverse model: volts for a motion; as a few numbers: table), speed_loop (body velocity in,
 volts out), pid (pose in, volts out; for many robots pid_batch), mpc/ (the same, looking ahead), policy (a network).
 What they know of the robot and its loop: instruments, pose_estimator, filtered_twist, pose_gate, swing.
-controllers: all of them by name. closed_loop (a controller and a simulated robot, step by step; its result: tracking),
+controllers: all of them by name. closed_loop (a controller and a simulated robot, step by step; its result: tracking; margins beside it),
 tune (gains from such runs), first_runs (whatever the compiler is needed for).
 """

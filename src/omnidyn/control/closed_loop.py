@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, overload
 
 import numpy as np
@@ -16,6 +16,7 @@ from omnidyn.control.controller import OK, Controller
 from omnidyn.control.controllers import ControllerFile, controller_named, told_apart
 from omnidyn.control.feedforward import DT, check_dt
 from omnidyn.control.instruments import MOST_JITTER, Instruments, Readings, instruments, told
+from omnidyn.control.margins import loop_margins
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
 from omnidyn.control.tracking import Tracking, Trackings
@@ -151,7 +152,7 @@ def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by
         raise InputError("no controller", got="an empty list", expected="one controller or more", where="controller")
     options = {"supply": supply, **told_of_loop(believed, around)}
     controllers = told_apart([_controller(entry, believed, options) for entry in wanted], wanted)
-    trackings = [tracked(plant or robot, follow, follower, around, progress) for follower in controllers]
+    trackings = [tracked_with_margins(plant or robot, follow, follower, around, progress) for follower in controllers]
     return Trackings(tuple(trackings)) if isinstance(controller, list | tuple) else trackings[0]
 
 
@@ -176,6 +177,15 @@ def told_of_loop(robot: Robot, around: Circumstances) -> dict[str, Any]:
     """What a controller is told of the loop it is in: the time between steps, and by how many of them it is late."""
     late = round(robot.drive.latency / around.dt) + around.delay
     return {"dt": around.dt, **({"delay": late} if around.delay else {})}
+
+
+def tracked_with_margins(
+    plant: Robot, path: Path, controller: Controller, around: Circumstances, progress: Progress = silent
+) -> Tracking:
+    """`tracked`, and by how much its outputs may be later and stronger."""
+    _check_match(plant, controller, around.supply)
+    margins = loop_margins(plant, controller, around)
+    return replace(tracked(plant, path, controller, around, progress), margins=margins)
 
 
 def tracked(
