@@ -148,7 +148,7 @@ def exam(table: Table) -> None:
             f"<= 1.1 x {RMSE[kind]}, both {kind}s",
             value <= 1.1 * RMSE[kind],
             data="bench, choice",
-            what=f"chosen: {_words(choice.way)}; rmse {kind}2",
+            what=f"chosen: {_words(choice.options)}; rmse {kind}2",
             value=value,
             unit="turns/s",
         )

@@ -81,9 +81,9 @@ def chosen(table: Table, parts: Sequence[Run]) -> None:
     """Clean: latency and dead band chosen on the first half, by its own quarters; then run on the second half, once."""
     ways = [{"dead_band": band, "latency": late} for band in (False, True) for late in (False, True)]
     choice = choose_motor(parts[0], ways=ways, score=window_rmse, kind="duty", angle=True)
-    words = ", ".join(f"{name}: {'yes' if value else 'no'}" for name, value in choice.way.items())
+    words = ", ".join(f"{name}: {'yes' if value else 'no'}" for name, value in choice.options.items())
     value = window_rmse(choice.fit, [parts[1]])
-    baseline = TURNING if choice.way["dead_band"] else TURNING_PROPORTIONAL
+    baseline = TURNING if choice.options["dead_band"] else TURNING_PROPORTIONAL
     table.add(
         f"<= {baseline}",
         value <= baseline,
@@ -253,7 +253,9 @@ def _drives_chosen(table: Table, runs: Sequence[Run]) -> None:
     choices = [
         choose_motor(runs[:3], motor, ways=ways, score=score, kind="duty", loss="student-t") for motor in range(3)
     ]
-    words = "; ".join(f"{c.way['between']}, {'with' if c.way['dead_band'] else 'without'} Coulomb" for c in choices)
+    words = "; ".join(
+        f"{c.options['between']}, {'with' if c.options['dead_band'] else 'without'} Coulomb" for c in choices
+    )
     value = _together([score(choice.fit, runs[3:]) for choice in choices])
     table.add(
         f"<= {DRIVES}, README, fitted to all",

@@ -59,6 +59,7 @@ _HOME = {
     "moving_axes": "omnidyn.model.deadzone",
     "path": "omnidyn.control.paths.path",
     "path_demand": "omnidyn.control.demand",
+    "plan": "omnidyn.identification.planning.plan",
     "preset_names": "omnidyn.model.robot_file",
     "read_commands": "omnidyn.logs.command_file",
     "read_log": "omnidyn.logs.read_log",
@@ -99,6 +100,7 @@ if TYPE_CHECKING:
     from omnidyn.identification.identification import Identification
     from omnidyn.identification.identify import identify
     from omnidyn.identification.methods import MotorFit, MotorLine, OutputError, SteadyState
+    from omnidyn.identification.planning.plan import plan
     from omnidyn.logs.command_file import read_commands
     from omnidyn.logs.read_log import load_log, read_log
     from omnidyn.logs.run_file import write_run

@@ -7,9 +7,10 @@ import pytest
 
 import omnidyn
 from omnidyn.control.filtered_twist import FilteredTwist
-from omnidyn.control.instruments import Instruments, Readings, instruments
+from omnidyn.control.instruments import Instruments, instruments
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.pid import Pid
+from omnidyn.control.readings import Readings
 from omnidyn.control.speed_loop import SpeedLoop
 from omnidyn.errors import InputError
 from omnidyn.model.log_effects import Sensors

@@ -41,6 +41,7 @@ PUBLIC = [
     "moving_axes",
     "path",
     "path_demand",
+    "plan",
     "preset_names",
     "read_commands",
     "read_log",

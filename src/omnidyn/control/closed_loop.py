@@ -15,10 +15,11 @@ from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import OK, Controller
 from omnidyn.control.controllers import ControllerFile, controller_named, told_apart
 from omnidyn.control.feedforward import DT, check_dt
-from omnidyn.control.instruments import MOST_JITTER, Instruments, Readings, instruments, told
+from omnidyn.control.instruments import MOST_JITTER, Instruments, instruments
 from omnidyn.control.margins import loop_margins
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
+from omnidyn.control.readings import Readings, with_sensors
 from omnidyn.control.tracking import Tracking, Trackings
 from omnidyn.errors import InputError
 from omnidyn.model.drive import DUTY, SPEED
@@ -145,7 +146,7 @@ def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by
         raise InputError("no delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
     kit = instruments(sensors, plant or robot)
     around = Circumstances(dt, duration, skip, noise, int(delay), seed, push, supply, kit)
-    believed = told(robot, sensors)
+    believed = with_sensors(robot, sensors)
     follow = path_named(path)
     wanted = list(controller) if isinstance(controller, list | tuple) else [controller]
     if not wanted:

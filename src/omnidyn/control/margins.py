@@ -17,8 +17,9 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import Controller
-from omnidyn.control.instruments import Instruments, Readings
+from omnidyn.control.instruments import Instruments
 from omnidyn.control.paths.motion import Path, Reference
+from omnidyn.control.readings import Readings
 from omnidyn.model.frames import body_to_world
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds

@@ -31,15 +31,8 @@ from omnidyn.control.controller import WHEEL_SPEED, Guarded
 from omnidyn.control.feedforward import DT, LoopCommands, Volts, check_delay, check_dt, lateness
 from omnidyn.control.paths.ahead import Ahead
 from omnidyn.control.paths.motion import Path
-from omnidyn.control.speed_loop import (
-    MOST_STEPS,
-    SWIFT,
-    check_faster,
-    check_integral,
-    place_gains,
-    pole_rate,
-    pose_gains,
-)
+from omnidyn.control.pole_placement import SWIFT, check_faster, check_integral, place_gains, pole_rate, pose_gains
+from omnidyn.control.speed_loop import MOST_STEPS
 from omnidyn.control.swing import Swing
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.inverse import Effort
@@ -58,14 +51,14 @@ Three = tuple[float, float, float]
 class Aim(NamedTuple):
     """What a step of the loop shall do, but for the sum of errors.
 
-    turned: world to body, shape (*batch, 3, 3). now: twist of the path, change: acceleration wanted, way: twist which
-    friction opposes; shape (*batch, 3).
+    turned: world to body, shape (*batch, 3, 3). now: twist of the path, change: acceleration wanted. friction_twist:
+    what friction opposes; shape (*batch, 3).
     """
 
     turned: FloatArray
     now: FloatArray
     change: FloatArray
-    way: FloatArray
+    friction_twist: FloatArray
 
 
 class Pid(Guarded):
@@ -247,14 +240,14 @@ class Pid(Guarded):
         if self.sensors.averaged:  # a mean is half a step old
             speed = speed - 0.5 * (then - now)
         back = self.gains.speed * (speed - twist) + self.gains.place * error
-        change, way = self.volts.change(now, then), 0.5 * (now + then) + self.home * error
+        change, friction_twist = self.volts.change(now, then), 0.5 * (now + then) + self.home * error
         if not self.feedforward:
             now, change = 0.0 * now, 0.0 * change
-        return Aim(first, now, change + back, way)
+        return Aim(first, now, change + back, friction_twist)
 
     def effort(self, aim: Aim, total: FloatArray) -> Effort:
         """What that takes, with a sum of errors in the world [m s, m s, rad s]. (*batch, 3) -> (*batch, wheels)."""
-        return self.volts.softly(aim.now, aim.change + self.gains.sum * product(aim.turned, total), aim.way)
+        return self.volts.softly(aim.now, aim.change + self.gains.sum * product(aim.turned, total), aim.friction_twist)
 
 
 def summed(total: float, more: float, weight: float) -> float:

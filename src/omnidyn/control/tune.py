@@ -19,21 +19,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.arrays import FloatArray
-from omnidyn.control.closed_loop import Circumstances, Push, told_of_loop, tracked
+from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
 from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
 from omnidyn.control.demand import path_demand
 from omnidyn.control.feedforward import DT
-from omnidyn.control.instruments import Instruments, instruments, told
+from omnidyn.control.instruments import Instruments, instruments
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import is_several
 from omnidyn.control.paths.path import path as path_named
+from omnidyn.control.pushes import PUSHED, push_force, pushes
+from omnidyn.control.readings import with_sensors
 from omnidyn.control.tracking import Tracking
 from omnidyn.document import Document, Part, Points, Table, all_of, plain
 from omnidyn.errors import InputError
-from omnidyn.model.drive import SPEED
-from omnidyn.model.inverse import inverse
 from omnidyn.model.known.told import told as known_errors
 from omnidyn.model.known.uncertainty import plausible
 from omnidyn.model.log_effects import Sensors
@@ -247,7 +246,7 @@ def tune(
     kinds = (Path, str) if isinstance(path, Robot) else object
     check_order("tune(robot, path, controller)", (robot, Robot), (paths, kinds), (controller, str))
     _check_counts(draws, evaluations, path is None or paths)
-    kit, robot = instruments(sensors, robot), told(robot, sensors)
+    kit, robot = instruments(sensors, robot), with_sensors(robot, sensors)
     seconds = SECONDS if path is None and duration is None else duration
     around = Circumstances(dt, seconds, min(SKIP, 0.5 * (seconds or SECONDS)), noise, delay, seed, sensors=kit)
     spec = controller_spec(controller)
@@ -412,7 +411,7 @@ def _score(
 ) -> TuningScore:
     """What a controller for one robot comes to when it drives the others, free and pushed."""
     control = spec.make(robot, **told_of_loop(robot, around))
-    force = _force(robot)
+    force = push_force(robot)
     rows: list[list[Tracking]] = []
     weights: list[float] = []
     for path in paths:
@@ -421,7 +420,7 @@ def _score(
             weights.append(PUSHED if pushed else 1.0)
             for k, plant in enumerate(plants):
                 seed = [around.seed, k, len(rows)]
-                push = _pushes(force, around.duration or path.duration, np.random.default_rng(seed)) if pushed else None
+                push = pushes(force, around.duration or path.duration, np.random.default_rng(seed)) if pushed else None
                 number = int(np.random.default_rng(seed).integers(2**31))
                 under = replace(around, seed=number, **({} if push is None else {"push": push}))
                 row.append(tracked(plant, path, control, under))
@@ -442,37 +441,3 @@ def _score(
 def _squares(tracking: Tracking) -> tuple[float, float]:
     """Squared errors of a run: of the position [m^2], of the heading [rad^2]."""
     return tracking.rmse_position**2, tracking.rmse_heading**2
-
-
-# Pushes that nobody announces: a knock, then a long one, each from another side
-
-PUSH_EVERY, KNOCK, KNOCK_FORCE, LONG, LONG_FORCE = 2.0, 0.15, 3.0, 1.2, 0.8  # [s], [s], of dry friction, [s], of it
-PUSHED = 0.5  # weight of a run that is pushed, beside one that is not
-LEAST_PUSH = 0.5  # [m/s^2], [rad/s^2]: where little rubs
-
-
-def _force(robot: Robot) -> FloatArray:
-    """What pushes are measured by: the dry friction of each axis [N, N, N m]; zeros where none can be simulated."""
-    if robot.wheels.traction_mu is not None and robot.drive.kind == SPEED:
-        return np.zeros(3)
-    model = inverse(robot)
-    sliding = -model.friction(np.eye(3), np.zeros((3, 3)))[range(3), range(3)]
-    viscous = (model.levels.directions**2).T @ model.levels.viscous
-    return np.maximum(sliding - viscous, LEAST_PUSH * np.diag(model.mass))
-
-
-def _pushes(force: FloatArray, duration: float, random: np.random.Generator) -> Callable[[float], Push]:
-    """The wrench at a time [s] of a run."""
-    count = math.ceil(duration / PUSH_EVERY) + 1
-    sides = random.uniform(-1.0, 1.0, (count, 3)) * force
-    starts = PUSH_EVERY * np.arange(count) + random.uniform(0.2, PUSH_EVERY - LONG, count)
-
-    def push(t: float) -> Push:
-        k = min(max(int(t / PUSH_EVERY), 0), count - 1)
-        length, share = (KNOCK, KNOCK_FORCE) if k % 2 == 0 else (LONG, LONG_FORCE)
-        if not starts[k] <= t < starts[k] + length:
-            return (0.0, 0.0, 0.0)
-        x, y, turn = (share * sides[k]).tolist()
-        return (x, y, turn)
-
-    return push

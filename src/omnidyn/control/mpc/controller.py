@@ -45,17 +45,20 @@ from omnidyn.control.controller import (
     per_volt,
     supply_of,
     vector,
-    without_slip,
 )
 from omnidyn.control.feedforward import DT, check_dt, loop_motor
 from omnidyn.control.filtered_twist import FilteredTwist, filtered_twist
-from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Memory, MpcBatch, MpcWorkspace, control_step, expect
+from omnidyn.control.mpc.batch import MpcBatch
+from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, control_step, expect
+from omnidyn.control.mpc.memory import Memory, MpcWorkspace
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import PUSH, SCALE
-from omnidyn.control.mpc.settings import FILTERED, Preview, Settings
+from omnidyn.control.mpc.preview import Preview
+from omnidyn.control.mpc.settings import FILTERED, Settings
 from omnidyn.control.pose_estimator import PoseEstimator, pose_estimator
 from omnidyn.control.pose_gate import TRUSTED, PoseGate
 from omnidyn.control.swing import Swing
+from omnidyn.control.without_slip import without_slip
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope

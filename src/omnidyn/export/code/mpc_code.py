@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from omnidyn.control.controller import LARGEST_STATE, LATEST, MOST_BRIDGED
-from omnidyn.control.mpc import interior_point, loop, observer, program
+from omnidyn.control.mpc import interior_point, linear_motion, memory, observer, program, solve
 from omnidyn.control.mpc.controller import LONGEST, Mpc
 from omnidyn.control.mpc.model import (
     BY_MASS,
@@ -145,10 +145,10 @@ def _constants(controller: Mpc) -> str:
         "LATE_STEPS": controller.steps_late,
         "PASSES": observer.PASSES,
         "TERMS": TERMS,
-        "SOON": program.COMPARED_STEPS,
+        "SOON": linear_motion.COMPARED_STEPS,
         "AGAIN": settings.again,
-        "FIRST_PASSES": interior_point.FIRST,
-        "LAST_PASSES": interior_point.LAST,
+        "FIRST_PASSES": solve.FIRST,
+        "LAST_PASSES": solve.LAST,
         "MOST": MOST_PASSES,
     }
     numbers = {
@@ -163,16 +163,16 @@ def _constants(controller: Mpc) -> str:
         "TIGHT": FINAL_GAP,
         "LEAST": LEAST_SLACK,
         "NARROWEST": NARROWEST,
-        "TURNED": program.HEADING_CHANGE,
-        "MOVED": program.FRICTION_CHANGE,
-        "PULLED": program.VOLTAGE_CHANGE,
+        "TURNED": linear_motion.HEADING_CHANGE,
+        "MOVED": linear_motion.FRICTION_CHANGE,
+        "PULLED": linear_motion.VOLTAGE_CHANGE,
         "FARTHEST_OFF": observer.OUTLIER_SQUARE,
         "KNOCK": observer.KNOCK_SQUARE,
         "MOST_KNOCKS": observer.MOST_KNOCKS,
         "KNOCK_MEMORY": observer.KNOCK_MEMORY,
         "MOST_SCALE": observer.LARGEST_SCALE,
-        "START_PUSH": loop.START_PUSH,
-        "START_SCALE": loop.START_SCALE,
+        "START_PUSH": memory.START_PUSH,
+        "START_SCALE": memory.START_SCALE,
         "SHARP": settings.volts,
     }
     if ellipse:
@@ -211,7 +211,7 @@ def _matrices(controller: Mpc, linear: np.ndarray) -> dict[str, Any]:
     matrices: dict[str, Any] = {"GAINS": np.concatenate([_square(linear, at) for at in (DECAY, PHI, PSI)])}
     matrices |= {"FEED": _square(linear, FEED), "PUSH": numbers.push.T, "PULL": numbers.pull}
     matrices |= {"WEIGHT": np.array((settings.pose, settings.twist), dtype=float).ravel()}
-    matrices |= {"NEAR": program.STANDSTILL, "HOME": program.HOME, "ARRIVED": program.ARRIVED}
+    matrices |= {"NEAR": linear_motion.STANDSTILL, "HOME": program.HOME, "ARRIVED": program.ARRIVED}
     if len(numbers.levels):
         assert (GX, BY_MASS_GX, SOFT_SPEED) == (0, 3, 9)  # columns that model.c counts by hand
         matrices["LEVEL"] = numbers.levels[:, : SOFT_SPEED + 1]  # what falls with the speed has no C

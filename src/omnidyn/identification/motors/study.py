@@ -248,7 +248,7 @@ def _lines(logs: Sequence[MotorLog], method: MotorLine) -> MotorStudy:
     lines = tuple(
         line
         if line.motor is None
-        else line.bounded(turned_under(logs, line.motor, way=orientation_of(logs, line.motor)), line.rest)
+        else line.bounded(turned_under(logs, line.motor, orientation=orientation_of(logs, line.motor)), line.rest)
         for line in (_with_misses(line, windows) for line in lines)
     )
     study = MotorStudy(

@@ -24,6 +24,7 @@ _HOME = {
     "RobotEnv": "omnidyn.interop.gymnasium.single",
     "RobotVectorEnv": "omnidyn.interop.gymnasium.vector",
     "check_vector_env": "omnidyn.interop.gymnasium.checker",
+    "policy_of_sb3": "omnidyn.interop.gymnasium.adapters",
     "rollout": "omnidyn.interop.gymnasium.runs",
     "rsl_rl_env": "omnidyn.interop.gymnasium.adapters",
     "sb3_env": "omnidyn.interop.gymnasium.adapters",

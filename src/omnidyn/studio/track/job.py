@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 import omnidyn
-from omnidyn.control.instruments import told
-from omnidyn.control.paths.curve import path_of_file, through
 from omnidyn.control.paths.motion import Path
+from omnidyn.control.paths.polyline import path_of_file, through
+from omnidyn.control.readings import with_sensors
 from omnidyn.control.tracking import Trackings, trackings_document
 from omnidyn.document import plain
 from omnidyn.model.robot import Robot
@@ -45,7 +45,7 @@ def _tracked(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     sensors, path = request["sensors"] or None, _path(request, folder)
     trackings = omnidyn.track(robot, path, request["controllers"], plant=plant, sensors=sensors, progress=listen)
     listen(Report("drawing"))
-    demand = omnidyn.path_demand(told(robot, sensors), path)
+    demand = omnidyn.path_demand(with_sensors(robot, sensors), path)
     for k, tracking in enumerate(trackings):
         omnidyn.write_run(tracking.run, folder / f"run-{k + 1}.csv")
     (folder / MOTION).write_text(json.dumps(_motion(trackings, plant)), "utf-8")

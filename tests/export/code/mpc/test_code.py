@@ -10,7 +10,7 @@ import pytest
 
 import omnidyn
 from omnidyn.control.controllers import ControllerFile, controller_named, save_controller
-from omnidyn.control.mpc.riccati import CP, CV, GX, GY, HP, HV, PULL, WEIGHT, E, V
+from omnidyn.control.mpc.columns import CP, CV, GX, GY, HP, HV, PULL, WEIGHT, E, V
 from omnidyn.control.paths.path import path
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.code.c_controller import c_controller
