@@ -181,7 +181,7 @@ def tune(
             delay=delay,
             dt=dt,
             duration=duration,
-            seed=seed,
+            rng=seed,
             sensors=sensors or None,
             progress=progress,
         )

@@ -23,10 +23,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
+from omnidyn.control.closed_loop import Circumstances, circumstances, told_of_loop, tracked
 from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
 from omnidyn.control.demand import path_demand
-from omnidyn.control.feedforward import DT
 from omnidyn.control.instruments import Instruments, instruments
 from omnidyn.control.margins import Margins, has_delay_margin, loop_margins
 from omnidyn.control.mpc.controller import Mpc
@@ -40,13 +39,13 @@ from omnidyn.document import Document, Part, Points, Table, all_of, plain
 from omnidyn.errors import InputError
 from omnidyn.model.known.told import told as known_errors
 from omnidyn.model.known.uncertainty import plausible
-from omnidyn.model.log_effects import Sensors
 from omnidyn.model.robot import Robot
 from omnidyn.model.value import PerWheel
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.shown import Displayable
 from omnidyn.statement import NOTE, Statement, as_verdict
 
+LOOP = ("dt", "duration", "noise", "delay", "rng", "sensors")  # options of the loop
 DRAWS, EVALUATIONS, NOISE = 3, 30, 0.005
 MOST_DRAWS, MOST_EVALUATIONS = 1000, 10_000
 FACTORS, FARTHEST = (4.0, 2.0), 16.0  # by which a setting is changed, round by round; and from the start at the most
@@ -221,13 +220,8 @@ def tune(
     *,
     draws: int = DRAWS,
     evaluations: int = EVALUATIONS,
-    noise: float = NOISE,
-    delay: int = 0,
-    dt: float = DT,
-    duration: float | None = None,
-    seed: int = 0,
-    sensors: str | Instruments | Sensors | None = None,
     progress: Progress = silent,
+    **options: Any,
 ) -> Tuned:
     """Find the settings of a controller by simulation, over the robots that the file says may be meant.
 
@@ -241,25 +235,28 @@ def tune(
         controller: A name or a controller file: its options are where the search begins.
         draws: Robots that are driven.
         evaluations: Settings that are tried, at the most.
-        noise: As for `track` [m/s]; noise 0 and no delay make gains as large as dt allows.
-        delay: As for `track`.
-        dt: As for `track` [s].
-        duration: As for `track` [s].
-        seed: As for `track`; of the draws and pushes too.
-        sensors: As for `track`.
         progress: Hears what is being driven.
+        options: Of the loop, by name, as for `track`: dt=0.02, duration, noise=0.005, delay=0, sensors, and rng=0, that
+            of the draws and pushes too. Noise 0 and no delay make gains as large as dt allows.
 
     Raises InputError for a controller without gains, or a number out of range.
+
+    >>> import omnidyn
+    >>> tuned = omnidyn.tune(omnidyn.load_robot("axebot"), "circle", "speed", draws=1, evaluations=2, duration=0.5)
+    >>> omnidyn.track(omnidyn.load_robot("axebot"), "circle", tuned.controller, duration=0.5).controller
+    'speed'
     """
     paths: list[Any] = [] if path is None else list(path) if is_several(path) else [path]
     kinds = (Path, str) if isinstance(path, Robot) else object
     check_order("tune(robot, path, controller)", (robot, Robot), (paths, kinds), (controller, str))
     _check_counts(draws, evaluations, path is None or paths)
-    kit, robot = instruments(sensors, robot), with_sensors(robot, sensors)
-    seconds = SECONDS if path is None and duration is None else duration
-    around = Circumstances(dt, seconds, min(SKIP, 0.5 * (seconds or SECONDS)), noise, delay, seed, sensors=kit)
+    seconds = options.get("duration", SECONDS if path is None else None)
+    around = circumstances(robot, LOOP, **{"noise": NOISE, **options, "duration": seconds})
+    around = replace(around, skip=min(SKIP, 0.5 * (seconds or SECONDS)))
+    kit, seed = around.sensors or instruments(None, robot), around.seed
+    robot = with_sensors(robot, options.get("sensors"))
     spec = controller_spec(controller)
-    start = _start(spec, robot, dt)
+    start = _start(spec, robot, around.dt)
     follow, judged = [[path_named(item) for item in paths]] * 2 if paths else _paths(robot)
     uncertain = bool(known_errors(robot).keys)
     training, held_out = (
@@ -282,7 +279,7 @@ def tune(
         control = settings.make(robot, **told_of_loop(robot, around))
         return has_delay_margin(robot, control, around, LEAST_DELAY)
 
-    begin = start if is_steady(_with(spec, start)) else _start(replace(spec, options={}), robot, dt)
+    begin = start if is_steady(_with(spec, start)) else _start(replace(spec, options={}), robot, around.dt)
     best = _search(begin, TUNED[spec.controller], cost, evaluations)
     old, new, fresh = _with(spec, start), _with(spec, best), replace(around, seed=seed + 1)
     before, tried = (_score(robot, held_out, judged, gains, fresh) for gains in (old, new))
@@ -308,9 +305,9 @@ def tune(
         draws,
         uncertain,
         count,
-        noise,
-        delay,
-        dt,
+        around.noise,
+        around.delay,
+        around.dt,
         str(kit),
         margins,
     )

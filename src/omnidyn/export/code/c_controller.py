@@ -25,7 +25,6 @@ from omnidyn.control.feedforward import DT, Feedforward, check_dt
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.motion import Path, Reference
 from omnidyn.control.pid import Pid
-from omnidyn.control.swing import CHANGES, WINDOW
 from omnidyn.control.pose_estimator import (
     AGE,
     ALIKE,
@@ -44,6 +43,7 @@ from omnidyn.control.pose_estimator import (
     rows_of,
 )
 from omnidyn.control.speed_loop import MOST_STEPS, SpeedController
+from omnidyn.control.swing import CHANGES, WINDOW
 from omnidyn.export.code.mpc_code import mpc_code, mpc_input, mpc_memory, mpc_switches
 from omnidyn.export.code.trace import statements
 from omnidyn.export.contract import Export

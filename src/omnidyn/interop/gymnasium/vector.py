@@ -186,10 +186,10 @@ def check_render_mode(mode: str | None) -> str | None:
 
 def made_setting(task: str, options: dict[str, Any]) -> Setting:
     """The setting of options. Raises InputError for one that there is not, with the nearest."""
-    known = [field.name for field in fields(Setting)]
+    names = [field.name for field in fields(Setting)]
     for name in options:
-        if name not in known:
-            raise unknown_option("an environment", name, known, "environment")
+        if name not in names:
+            raise unknown_option("an environment", name, names, "environment")
     return Setting(**{"task": task, **options})
 
 
