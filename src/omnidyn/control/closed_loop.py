@@ -16,6 +16,7 @@ from omnidyn.control.controller import OK, Controller
 from omnidyn.control.controllers import ControllerFile, controller_named, told_apart
 from omnidyn.control.feedforward import DT, check_dt
 from omnidyn.control.instruments import MOST_JITTER, Instruments, instruments
+from omnidyn.control.margins import loop_margins
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
 from omnidyn.control.readings import Readings, with_sensors
@@ -156,7 +157,8 @@ def track(
         raise InputError("no controller", got="an empty list", expected="one controller or more", where="controller")
     of_loop = {"supply": around.supply, **told_of_loop(believed, around)}
     controllers = told_apart([_controller(entry, believed, of_loop) for entry in wanted], wanted)
-    first, *others = [tracked(plant or robot, follow, follower, around, progress) for follower in controllers]
+    driven = plant or robot
+    first, *others = [tracked_with_margins(driven, follow, follower, around, progress) for follower in controllers]
     return replace(first, others=tuple(others))
 
 
@@ -181,6 +183,15 @@ def told_of_loop(robot: Robot, around: Circumstances) -> dict[str, Any]:
     """What a controller is told of the loop it is in: the time between steps, and by how many of them it is late."""
     late = round(robot.drive.latency / around.dt) + around.delay
     return {"dt": around.dt, **({"delay": late} if around.delay else {})}
+
+
+def tracked_with_margins(
+    plant: Robot, path: Path, controller: Controller, around: Circumstances, progress: Progress = silent
+) -> Tracking:
+    """`tracked`, and by how much its outputs may be later and stronger."""
+    _check_match(plant, controller, around.supply)
+    margins = loop_margins(plant, controller, around)
+    return replace(tracked(plant, path, controller, around, progress), margins=margins)
 
 
 def tracked(

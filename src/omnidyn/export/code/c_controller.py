@@ -105,7 +105,7 @@ def _header(law: Any, about: str) -> str:
         UNITS=_UNITS[law.output],
         MEMORY=(mpc_memory(law) if predicts else _MEMORY + _LOOP_MEMORY * _is_commanded(law))
         + ("\n    omnidyn_late late;" if _is_late(law) else "")
-        + ("\n    omnidyn_swing swing;" if _can_swing(law) else ""),
+        + (_SWING_MEMORY if predicts else "\n    omnidyn_swing swing;" if _can_swing(law) else ""),
         INPUT=(f"{mpc_input(law)}\n\n" if predicts else "")
         + (f"{filled(_LATE, ROWS=str(_late_rows(law))).strip()}\n\n" if _is_late(law) else "")
         + (f"{filled(_SWING, CHANGES=str(CHANGES)).strip()}\n\n" if _can_swing(law) else ""),
@@ -161,6 +161,10 @@ def _swing_code(law: Pid | Mpc) -> str:
     return f"{defines}\n{least}\n\n{text.strip()}"
 
 
+_SWING_MEMORY = """
+#if OMNIDYN_SWING
+    omnidyn_swing swing;
+#endif"""
 _SWING = """
 /* Of each axis: the side of the error of its speed, and for how long [s] its last changes count. */
 typedef struct {
