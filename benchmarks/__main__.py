@@ -51,6 +51,7 @@ NAMES = {
     "ladder": "identify with its ladder, on wrong and right worlds: what it takes, what then holds (40 minutes)",
     "group_shapes": "a shape of friction per group, a level of each wheel: taken where it is so only (half an hour)",
     "selection": "the rule of selection beside those before it: useless numbers taken, effects found (a minute)",
+    "plans": "a planned minute of driving beside others, inside its room, and as sure as predicted (minutes)",
     "studies": "intervals and false alarms over many draws: breakaway, laws, rounding, noise, motors (15 minutes)",
     "ordinary": "robots as people have them: one evaluation, a run, whole fits, beside goals (ten minutes)",
     # real

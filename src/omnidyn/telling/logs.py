@@ -222,6 +222,7 @@ SENTENCES = {
     "current_sign_taken": Sentence(
         "currents are taken as unsigned: they get the sign of the {origin}, and 0 where that is 0"
     ),
+    "file_cut_short": Sentence("{text}"),
     "rows_joined": Sentence("{joined} of {rows} rows fill the blanks of a row of the same time: joined to it"),
     "rows_empty": Sentence("{left_out} of {rows} rows hold no time or no number: left out, first in line {first}"),
     "rows_of_padding": Sentence(

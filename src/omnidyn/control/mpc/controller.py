@@ -146,7 +146,7 @@ class Mpc:
         self._tables = self.robot_settings.tables(driven, self.dt, self.observer)
         self._filtered_twist = filtered_twist(robot, self._filtered_twist)
         self._gate = PoseGate(robot, self.dt, vars(self).get("_gate"))
-        self._swing = Swing(robot, self.dt)
+        self.swing = Swing(robot, self.dt)
         self._control = None  # compiled by the first step
 
     def reset(self) -> None:
@@ -155,7 +155,7 @@ class Mpc:
         self._known, self._t, self._last = False, math.nan, self._zeros.copy()
         self._asked: tuple[str, int, float] = (WAITING, 0, 0.0)
         self._state, self._missing, self._since = np.zeros(6), 0, math.nan
-        for sensor in (self._estimator, self._filtered_twist, self._gate, self._swing):
+        for sensor in (self._estimator, self._filtered_twist, self._gate, self.swing):
             if sensor is not None:
                 sensor.reset()
 
@@ -289,7 +289,7 @@ class Mpc:
             sent = np.clip(sent, -self.limit, self.limit)
         self._last = sent
         wanted, (vx, vy, omega) = preview.rows[row - preview.late, 3:].tolist(), self._state[3:].tolist()
-        swinging = self._swing.found(float(t), vx - wanted[0], vy - wanted[1], omega - wanted[2])
+        swinging = self.swing.found(float(t), vx - wanted[0], vy - wanted[1], omega - wanted[2])
         status = INACCURATE if inaccurate else SWINGS if swinging else PATH_ENDED if t > preview.end else OK
         self._asked = (status, passes, time.perf_counter() - start)
         return sent.copy()

@@ -15,9 +15,11 @@ from omnidyn.control.controller import MOST_BRIDGED
 from omnidyn.control.controllers import controller_spec
 from omnidyn.control.feedforward import DT, check_dt
 from omnidyn.control.mpc.controller import Mpc
+from omnidyn.control.swing import CHANGES
 from omnidyn.export.code.control_code import LOOP_MEMORY, control_code, is_commanded
 from omnidyn.export.code.late_pose_code import LATE_STRUCT, is_late, late_pose_code, late_rows
 from omnidyn.export.code.mpc_code import mpc_code, mpc_input, mpc_memory, mpc_switches
+from omnidyn.export.code.swing_code import SWING_MEMORY, SWING_STRUCT, can_swing, swing_code
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse, refuse_controller
 from omnidyn.export.spelling import c_comment, c_number, filled
@@ -51,7 +53,9 @@ def c_controller(robot: Robot, controller: str | os.PathLike = "pid", dt: float 
     code = mpc_code(law) if predicts else control_code(law)  # pyright: ignore[reportArgumentType]  none is refused
     about = [f"{law.name} of {robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in omissions)]
     head = c_comment(about)
-    code = "\n\n".join([f"{head}\n{_INCLUDES.rstrip()}", late_pose_code(law), code])
+    swing = swing_code(law) if can_swing(law) else ""
+    swing = f"#if OMNIDYN_SWING\n{swing}\n#endif" if predicts else swing
+    code = "\n\n".join(part for part in (f"{head}\n{_INCLUDES.rstrip()}", late_pose_code(law), swing, code) if part)
     texts = {"omnidyn_control.h": _header(law, head), "omnidyn_control.c": f"{code}\n"}
     return Export(KIND, robot.name, texts, omissions, notes, folder=True)
 
@@ -73,9 +77,11 @@ def _header(law: Any, about: str) -> str:
         DEFINES=defines,
         UNITS=_UNITS[law.output],
         MEMORY=(mpc_memory(law) if predicts else _MEMORY + LOOP_MEMORY * is_commanded(law))
-        + ("\n    omnidyn_late late;" if is_late(law) else ""),
+        + ("\n    omnidyn_late late;" if is_late(law) else "")
+        + (SWING_MEMORY if predicts else "\n    omnidyn_swing swing;" if can_swing(law) else ""),
         INPUT=(f"{mpc_input(law)}\n\n" if predicts else "")
-        + (f"{filled(LATE_STRUCT, ROWS=str(late_rows(law))).strip()}\n\n" if is_late(law) else ""),
+        + (f"{filled(LATE_STRUCT, ROWS=str(late_rows(law))).strip()}\n\n" if is_late(law) else "")
+        + (f"{filled(SWING_STRUCT, CHANGES=str(CHANGES)).strip()}\n\n" if can_swing(law) else ""),
         AHEAD=_AHEAD if predicts else _NOW_AND_AHEAD,
         ROWS="OMNIDYN_HORIZON + 1" if predicts else "3",
         BRIDGED=str(MOST_BRIDGED),
@@ -116,12 +122,13 @@ typedef struct {
 @MEMORY@
 } omnidyn_control;
 
-/* What a step says of itself. Up to OMNIDYN_STILL the output is as wanted; from OMNIDYN_BACKWARDS on it is zeros, but
+/* What a step says of itself. Up to OMNIDYN_SWINGS the output is as wanted; from OMNIDYN_BACKWARDS on it is zeros, but
    that @BRIDGED@ measurements missing in a row are bridged. */
 enum {
     OMNIDYN_OK,
     OMNIDYN_LIMITED,   /* a motor is at a limit of voltage or current */
     OMNIDYN_STILL,     /* no time has gone by: the last output again */
+    OMNIDYN_SWINGS,    /* the loop swings: correct latency_s of [drive], or lower the gains */
     OMNIDYN_BACKWARDS, /* time went backwards: errors summed up are forgotten */
     OMNIDYN_BAD_TIME,
     OMNIDYN_BAD_POSE,

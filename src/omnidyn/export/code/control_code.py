@@ -27,10 +27,18 @@ from omnidyn.model.wheels import wheel_speed
 ROUNDING = 1e-6
 AnyOf = Feedforward | Pid | SpeedController
 NOTHING = 1e-13  # of the largest share of a motor: it has none
+_SUM = """static float summed(float total, float more, float weight)
+{
+    if (more * total >= 0.0f) { /* of large errors little */
+        return total + weight * more;
+    }
+    return weight < 1.0f && (total + more) * total < 0.0f ? 0.0f : total + more;
+}"""
 _HELPERS = (
     ("sign_of", "static float sign_of(float a) { return (float)((a > 0.0f) - (a < 0.0f)); }"),
     ("min_of", "static float min_of(float a, float b) { return a < b ? a : b; }"),
     ("max_of", "static float max_of(float a, float b) { return a > b ? a : b; }"),
+    ("summed", _SUM),
 )
 
 
@@ -43,15 +51,22 @@ def control_code(controller: AnyOf) -> str:
         traced, body = _feedforward(controller)
     else:
         traced, body = _pid(controller) if isinstance(controller, Pid) else _speed(controller)
-    helpers = [text for name, text in _HELPERS if f"{name}(" in "".join(traced)]
+    helpers = [text for name, text in _HELPERS if f"{name}(" in "".join([*traced, body])]
     tables = {"LIMIT": controller.limit} if controller.output == WHEEL_SPEED else _limits(controller)
     if isinstance(controller, Pid) and controller.output == WHEEL_SPEED:
         tables["VOLTAGE_LIMIT"] = controller.commands.limit
-    constants = [f"static const float {name}[{len(table)}] = {{{_numbers(table)}}};" for name, table in tables.items()]
+    constants = [
+        f"static const float {name}[{len(table)}] = {{{c_literals(table)}}};" for name, table in tables.items()
+    ]
     numbers = {"FARTHEST": c_literal(LARGEST_STATE), "LARGEST": "3.0e38f", "LATEST": c_literal(LATEST * controller.dt)}
     numbers["STOPS"] = "\n    self->driven = 0;" if is_commanded(controller) else ""
+    can_swing = isinstance(controller, Pid)
+    numbers["UNSWUNG"] = "\n    memset(&self->swing, 0, sizeof(self->swing));" if can_swing else ""
+    numbers["SWUNG"], numbers["SWINGS"] = (", swinging", "swinging ? OMNIDYN_SWINGS : ") if can_swing else ("", "")
+    found = "    swinging = swings(&self->swing, elapsed, pose[2], twist, path[0].velocity);\n"
+    numbers["SWING"] = found if can_swing else ""
     step = filled(_STEP, WANTED=textwrap.indent(body, "    "), BRIDGED=str(MOST_BRIDGED), **numbers)
-    include = ["#include <string.h>"] * is_commanded(controller)
+    include = ["#include <string.h>"] * can_swing
     parts = [*include, "\n".join(constants), "\n".join(helpers), *traced, *_within(controller), step.strip()]
     return "\n\n".join(part for part in parts if part)
 
@@ -156,16 +171,20 @@ def _speed(controller: SpeedController) -> tuple[list[str], str]:
 
 def _summed(controller: Pid | SpeedController, arguments: str) -> str:
     """The loop over sums of errors in C: given, the arguments of `effort` before the sum."""
-    return filled(_SUMMED, LONGEST=c_literal(MOST_STEPS * controller.dt), GIVEN=arguments).strip()
+    plain = isinstance(controller, SpeedController)
+    raised = "self->sum[k] + off[k] * elapsed" if plain else "summed(self->sum[k], off[k] * elapsed, weight[k])"
+    return filled(_SUMMED, LONGEST=c_literal(MOST_STEPS * controller.dt), GIVEN=arguments, RAISED=raised).strip()
 
 
 def _pid(controller: Pid) -> tuple[list[str], str]:
     """(functions, statements that put what is wanted into `output`)."""
-    head = "float off[3], velocity[3][3]"
+    head, (place, turn) = "float off[3], weight[3], velocity[3][3]", map(c_literal, controller.farthest)
     gather = (
         "for (k = 0; k < 9; k++) {\n    velocity[k / 3][k % 3] = path[k / 3].velocity[k % 3];\n}\n"
         "for (k = 0; k < 3; k++) {\n    off[k] = path[0].pose[k] - pose[k];\n}\n"
         f"off[2] = remainderf(off[2], {c_literal(2.0 * np.pi)});\n"
+        f"weight[0] = weight[1] = {place} / max_of({place}, off[0] * off[0] + off[1] * off[1]);\n"
+        f"weight[2] = {turn} / max_of({turn}, off[2] * off[2]);\n"
     )
     if controller.output == WHEEL_SPEED:
         call = filled(_COMMANDED, LONGEST=c_literal(MOST_STEPS * controller.dt)).strip()
@@ -198,7 +217,7 @@ def _function(
     )
 
 
-def _numbers(values: np.ndarray) -> str:
+def c_literals(values: np.ndarray) -> str:
     return ", ".join(map(c_literal, np.asarray(values, dtype=float).tolist()))
 
 
@@ -245,7 +264,7 @@ _TOGETHER = """
 _SUMMED = """
 elapsed = elapsed < @LONGEST@ ? elapsed : @LONGEST@;
 for (k = 0; k < 3; k++) {
-    more[k] = self->sum[k] + off[k] * elapsed;
+    more[k] = @RAISED@;
 }
 effort(@GIVEN@, more, output, current);
 limited = within(output, current);
@@ -271,7 +290,7 @@ for (k = 0; k < OMNIDYN_WHEELS; k++) {
 }
 for (k = 0; k < 3; k++) {
     self->reached[k] = self->driven ? self->reached[k] : twist[k];
-    more[k] = self->sum[k] + off[k] * elapsed;
+    more[k] = summed(self->sum[k], off[k] * elapsed, weight[k]);
 }
 self->driven = 1;
 commands(off, pose[2], (const float(*)[3])velocity, more, 1.0f, self->reached, self->loop, output, self->mean, volts,
@@ -329,7 +348,7 @@ void omnidyn_control_reset(omnidyn_control *self)
     int k;
     for (k = 0; k < 3; k++) {
         self->sum[k] = 0.0f;
-    }
+    }@UNSWUNG@
     for (k = 0; k < OMNIDYN_WHEELS; k++) {
         self->last[k] = 0.0f;
     }
@@ -342,7 +361,7 @@ void omnidyn_control_reset(omnidyn_control *self)
 int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[3], const float twist[3],
                          const omnidyn_motion path[3], float output[OMNIDYN_WHEELS])
 {
-    int k, limited, why, begun = self->begun;
+    int k, limited, why, begun = self->begun@SWUNG@;
 #if LATE_ROWS
     float now[3];
 #endif
@@ -386,7 +405,7 @@ int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[
         }
     }
     self->missing = 0;
-    limited = wanted(self, begun ? elapsed : 0.0f, pose, twist, path, output);
+@SWING@    limited = wanted(self, begun ? elapsed : 0.0f, pose, twist, path, output);
     for (k = 0; k < OMNIDYN_WHEELS; k++) {
         if (!(fabsf(output[k]) <= @LARGEST@)) {
             return safe(self, output, OMNIDYN_FAILED);
@@ -395,7 +414,7 @@ int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[
         output[k] = output[k] < -LIMIT[k] ? -LIMIT[k] : output[k];
         self->last[k] = output[k];
     }
-    return limited ? OMNIDYN_LIMITED : OMNIDYN_OK;
+    return @SWINGS@limited ? OMNIDYN_LIMITED : OMNIDYN_OK;
 }
 """
 

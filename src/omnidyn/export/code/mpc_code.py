@@ -101,7 +101,8 @@ def mpc_switches() -> str:
 
 _SWITCHES = """
 /* -DOMNIDYN_MOST_BRIDGED=0: a missing measurement gives zeros. -DOMNIDYN_ELAPSED=0: a step takes OMNIDYN_DT, not the
-   time that passed. -DOMNIDYN_FEW_KNOCKS=0: a loop that swings under pushes may go on. Less code each. */
+   time that passed. -DOMNIDYN_FEW_KNOCKS=0: a loop that swings under pushes may go on. -DOMNIDYN_SWING=0: a loop that
+   swings does not say so. Less code each. */
 #ifndef OMNIDYN_MOST_BRIDGED
 #define OMNIDYN_MOST_BRIDGED @BRIDGED@
 #endif
@@ -110,6 +111,9 @@ _SWITCHES = """
 #endif
 #ifndef OMNIDYN_FEW_KNOCKS
 #define OMNIDYN_FEW_KNOCKS 1
+#endif
+#ifndef OMNIDYN_SWING
+#define OMNIDYN_SWING 1
 #endif"""
 
 
