@@ -74,5 +74,5 @@ def _error(robot: Robot, reference: str, control: Any) -> float:
     """Position rmse [m], geometric mean over draws of the last bits of the measurements."""
     follow = path(reference)
     seconds = min(follow.duration, LONGEST)
-    runs = [omnidyn.track(robot, follow, control, duration=seconds, noise=NOISE, seed=k) for k in range(DRAWS)]
+    runs = [omnidyn.track(robot, follow, control, duration=seconds, noise=NOISE, rng=k) for k in range(DRAWS)]
     return mean([each.rmse_position for each in runs])

@@ -23,7 +23,7 @@ from benchmarks.export import exports_read
 from benchmarks.size import scaled
 from benchmarks.table import Table, Times, machine
 from omnidyn.arrays import FloatArray
-from omnidyn.model.deadzone import axis_patterns
+from omnidyn.model.deadzone import axis_patterns, breakaway_voltage
 from omnidyn.model.robot import Robot
 from omnidyn.paper.tables import TABLE_1
 from tests.support.exported import Stepper
@@ -55,7 +55,7 @@ def volts() -> FloatArray:
 def resting(robot: Robot, rows: int) -> FloatArray:
     """Half of the breakaway voltage forward. Shape (rows, 3)."""
     pattern = axis_patterns(robot)[0]
-    return np.tile(0.5 * omnidyn.breakaway_voltage(robot, pattern) * pattern, (rows, 1))
+    return np.tile(0.5 * breakaway_voltage(robot, pattern) * pattern, (rows, 1))
 
 
 def measure() -> Table:

@@ -18,7 +18,7 @@ from benchmarks.table import Table, machine
 from omnidyn.findings.check import check
 from omnidyn.identification.identify import identify
 from omnidyn.logs.geometry import wheel_geometry
-from omnidyn.logs.read_log import load_log, read_log
+from omnidyn.logs.read_log import read_log, recorded_log
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from tests.support.staggered import PERIOD, ROBOT, Logged, topics
@@ -47,7 +47,7 @@ def robot_of(folder: Path) -> Robot:
 
 def seen(path: Path, robot: Robot, jitter: float) -> Seen:
     """`check` and the geometry of a log."""
-    log = load_log(path)
+    log = recorded_log(path)
     verdict, geometry = check(log, robot), wheel_geometry([log.to_run()])
     rms = np.array([verdict.excitation[axis] for axis in ("x", "y", "yaw")])
     codes = (each.code for each in verdict.findings)

@@ -24,7 +24,7 @@ from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.identification.validation import FITTED, HELD_OUT
 from omnidyn.logs.columns.mapping import load_map
 from omnidyn.logs.log import Log
-from omnidyn.logs.read_log import LogOptions, load_log
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from omnidyn.logs.readers.folders import files_of, is_log_folder, natural
 from omnidyn.logs.readers.read_table import logs_in
 from omnidyn.logs.table.text_file import FILE_CUT_SHORT
@@ -132,7 +132,7 @@ def fit_row(name: str, robot: Robot, task: IdentifyTask, hashes: Mapping[str, st
         if hashes and hashes.get(str(file)) != file_sha256(file):
             raise InputError("the log has changed since the campaign began", where=str(file))
     try:
-        logs = [load_log(path, robot, _options(task)) for path in paths]
+        logs = [recorded_log(path, robot, _options(task)) for path in paths]
         runs = [log.to_run(sort=task.read.sort) for log in logs]
     except (InputError, InsufficientDataError) as error:
         return _row_without_numbers(Statement("log_not_read", ERROR, name, {"error": str(error)}))

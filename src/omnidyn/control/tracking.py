@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import PATH_ENDED
+from omnidyn.control.margins import MOST_DELAY, MOST_GAIN, Margins
 from omnidyn.document import Document, Part, Points, Table, plain
 from omnidyn.run import Run
 from omnidyn.shown import FIGURE, Displayable, make
@@ -24,12 +25,14 @@ MICRO = 1e6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Tracking(Displayable):
-    """What a closed loop did.
+    """What a closed loop did: a sequence of itself and of others on the same path, in the order of the call.
 
     controller, plant, path: their names. run: what the robot did. wanted: poses of the path at the times of the run,
     shape (samples, 3). skip [s]: errors before it count for nothing. dt [s]: between two steps.
     saturated_share: of the steps, those with an output at its limit. step_times [s]: of the controller, shape (steps,).
-    statuses: word of `info.status` other than "ok" -> number of steps. sensors: with which the robot was measured.
+    margins: by how much outputs may be later and stronger. statuses: word of `info.status` other than "ok" -> number of steps. sensors: with which the robot was measured.
+    others: of the other controllers; numbers are those of this one, `best` is the nearest of all, and summary, document
+    and plot are of all of them, side by side.
     """
 
     controller: str
@@ -43,9 +46,31 @@ class Tracking(Displayable):
     step_times: FloatArray
     statuses: Mapping[str, int] = field(default_factory=dict)
     sensors: str = ""
+    margins: Margins | None = None
+    others: tuple[Tracking, ...] = ()
 
     def __repr__(self) -> str:
+        if self.others:
+            return f"<Tracking of {self.path} by {', '.join(tracking.controller for tracking in self)}>"
         return f"<Tracking of {self.path} by {self.controller}: rmse {self.rmse_position:.3g} m>"
+
+    @cached_property
+    def _all(self) -> tuple[Tracking, ...]:
+        return (replace(self, others=()), *self.others) if self.others else (self,)
+
+    def __iter__(self) -> Iterator[Tracking]:
+        return iter(self._all)
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def __getitem__(self, index: int) -> Tracking:
+        return self._all[index]
+
+    @property
+    def best(self) -> Tracking:
+        """The one whose position is nearest to the path."""
+        return min(self, key=lambda tracking: tracking.rmse_position)
 
     @cached_property
     def error(self) -> FloatArray:
@@ -117,8 +142,8 @@ class Tracking(Displayable):
         return self.document().to_text()
 
     def document(self) -> Document:
-        """What it says."""
-        return trackings_document([self])
+        """What it says; of several controllers, side by side."""
+        return trackings_document([*self])
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -131,44 +156,10 @@ class Tracking(Displayable):
             "step_us": self.step_us,
             "effort_V": self.effort,
             "restlessness_V": self.restlessness,
+            "delay_margin_s": None if self.margins is None else self.margins.delay,
+            "gain_margin": None if self.margins is None else self.margins.gain,
             "statuses": dict(self.statuses),
         }
-
-    def plot(self) -> Figure:
-        """Path and robot from above, error over time, voltages, as a matplotlib Figure."""
-        return make(FIGURE, self)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Trackings(Displayable):
-    """What several controllers did on one path, in the order of the call: a sequence of Tracking."""
-
-    trackings: tuple[Tracking, ...]
-
-    def __iter__(self) -> Iterator[Tracking]:
-        return iter(self.trackings)
-
-    def __len__(self) -> int:
-        return len(self.trackings)
-
-    def __getitem__(self, index: int) -> Tracking:
-        return self.trackings[index]
-
-    def __repr__(self) -> str:
-        return f"<Trackings of {self[0].path} by {', '.join(tracking.controller for tracking in self)}>"
-
-    @property
-    def best(self) -> Tracking:
-        """The one whose position is nearest to the path."""
-        return min(self, key=lambda tracking: tracking.rmse_position)
-
-    def summary(self) -> str:
-        """The result as text."""
-        return self.document().to_text()
-
-    def document(self) -> Document:
-        """What they say, side by side."""
-        return trackings_document(self.trackings)
 
     def plot(self) -> Figure:
         """Path and robot from above, error over time, voltages, as a matplotlib Figure."""
@@ -197,6 +188,7 @@ def trackings_document(trackings: Sequence[Tracking], notes: Sequence[Statement]
             f"{100.0 * tracking.saturated_share:.1f}",
             f"{tracking.effort:.2f}",
             f"{tracking.restlessness:.3f}",
+            *_margins(tracking),
             f"{tracking.step_us['median']:.0f}",
             f"{tracking.step_us['p99']:.0f}",
         )
@@ -210,6 +202,8 @@ def trackings_document(trackings: Sequence[Tracking], notes: Sequence[Statement]
         "at limit %",
         "effort V",
         "change V",
+        "delay ms",
+        "gain",
         "step us",
         "p99 us",
     )
@@ -223,6 +217,7 @@ def trackings_document(trackings: Sequence[Tracking], notes: Sequence[Statement]
         Table(columns, rows, "<>", name="controllers"),
         "",
         "position, heading: rmse; effort: rms of a voltage; change: its mean change from step to step.",
+        "delay, gain: how much later outputs may act, and how many times as strong be, before the loop no longer settles.",
     ]
     parts += [Points(notes, "-", "path")] if notes else []
     parts.append(by_severity(warnings, "warnings"))
@@ -239,6 +234,17 @@ def trackings_document(trackings: Sequence[Tracking], notes: Sequence[Statement]
         "warnings": plain(warnings),
     }
     return Document(parts, data, warnings, verdict=verdict)
+
+
+def _margins(tracking: Tracking) -> tuple[str, str]:
+    """The margins in cells of a table."""
+    if tracking.margins is None:
+        return "", ""
+    delay, gain = tracking.margins.delay, tracking.margins.gain
+    return (
+        f"{'> ' * (delay >= MOST_DELAY)}{1e3 * delay:.0f}",
+        f"{'> ' * (gain >= MOST_GAIN)}{gain:.2g}",
+    )
 
 
 def _verdict(trackings: Sequence[Tracking]) -> Statement:

@@ -7,6 +7,10 @@ So a setting is judged by how many times less both are off. The robots are draws
 the robot file; each is measured with its own sensors, with the same noise and the same pushes for every g, so that J
 has no noise of its own. One setting after the other is made larger or smaller by a factor as long as J falls, then by a
 smaller one; what is found is judged on other draws, noise, pushes and paths.
+
+One robot in three has outputs that act LATENCY later, one LATENCY earlier and sensors a step worse. Settings of a loop
+that does not settle where its outputs act LEAST_DELAY later are not taken; from such a start the search goes back to
+the settings that the controller has by itself.
 """
 
 from __future__ import annotations
@@ -14,16 +18,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
+from omnidyn.control.circumstances import Circumstances, TuneOptions, circumstances
+from omnidyn.control.closed_loop import told_of_loop, tracked
 from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
 from omnidyn.control.demand import path_demand
-from omnidyn.control.feedforward import DT
 from omnidyn.control.instruments import Instruments, instruments
+from omnidyn.control.margins import Margins, has_delay_margin, loop_margins
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import is_several
@@ -35,7 +40,6 @@ from omnidyn.document import Document, Part, Points, Table, all_of, plain
 from omnidyn.errors import InputError
 from omnidyn.model.known.told import told as known_errors
 from omnidyn.model.known.uncertainty import plausible
-from omnidyn.model.log_effects import Sensors
 from omnidyn.model.robot import Robot
 from omnidyn.model.value import PerWheel
 from omnidyn.progress import Progress, Report, silent
@@ -91,7 +95,7 @@ class Tuned(Displayable):
     before, after: of these and of those chosen, over robots, noise, pushes and paths that the search has not seen;
     tried: of the best of the search there. own_before, own_after: on the robot of the file itself.
     draws: robots the search drove; uncertain: whether the file says how far its numbers may be off: else they are near
-    it. evaluations: gains that were tried. noise [m/s], delay [steps], dt [s], sensors: of the loops.
+    it. margins: of the loop with the gains chosen. evaluations: gains that were tried. noise [m/s], delay [steps], dt [s], sensors: of the loops.
     """
 
     robot: str
@@ -111,6 +115,7 @@ class Tuned(Displayable):
     delay: int
     dt: float
     sensors: str
+    margins: Margins
 
     def __repr__(self) -> str:
         return f"<Tuned {self.controller.controller} for {self.robot}: {dict(self.gains)}>"
@@ -148,6 +153,7 @@ class Tuned(Displayable):
         }
         statements = [
             Statement("optimised", NOTE, numbers=numbers),
+            Statement("tuned_margins", NOTE, numbers={"delay": self.margins.delay, "gain": self.margins.gain}),
             Statement("judged_elsewhere", NOTE, numbers={"paths": self.judged_on}),
         ]
         errors = {
@@ -199,6 +205,8 @@ class Tuned(Displayable):
                 "sensors": self.sensors,
                 "evaluations": self.evaluations,
                 "better": self.better,
+                "delay_margin_s": self.margins.delay,
+                "gain_margin": self.margins.gain,
                 "statements": self.statements(),
                 **as_verdict(self.verdict),
             }
@@ -212,13 +220,8 @@ def tune(
     *,
     draws: int = DRAWS,
     evaluations: int = EVALUATIONS,
-    noise: float = NOISE,
-    delay: int = 0,
-    dt: float = DT,
-    duration: float | None = None,
-    seed: int = 0,
-    sensors: str | Instruments | Sensors | None = None,
     progress: Progress = silent,
+    **options: Unpack[TuneOptions],
 ) -> Tuned:
     """Find the settings of a controller by simulation, over the robots that the file says may be meant.
 
@@ -232,29 +235,34 @@ def tune(
         controller: A name or a controller file: its options are where the search begins.
         draws: Robots that are driven.
         evaluations: Settings that are tried, at the most.
-        noise: As for `track` [m/s]; noise 0 and no delay make gains as large as dt allows.
-        delay: As for `track`.
-        dt: As for `track` [s].
-        duration: As for `track` [s].
-        seed: As for `track`; of the draws and pushes too.
-        sensors: As for `track`.
         progress: Hears what is being driven.
+        options: Of the loop, by name, as for `track`: dt=0.02, duration, noise=0.005, delay=0, sensors, and rng=0, that
+            of the draws and pushes too. Noise 0 and no delay make gains as large as dt allows.
 
     Raises InputError for a controller without gains, or a number out of range.
+
+    >>> import omnidyn
+    >>> tuned = omnidyn.tune(omnidyn.load_robot("axebot"), "circle", "speed", draws=1, evaluations=2, duration=0.5)
+    >>> omnidyn.track(omnidyn.load_robot("axebot"), "circle", tuned.controller, duration=0.5).controller
+    'speed'
     """
     paths: list[Any] = [] if path is None else list(path) if is_several(path) else [path]
     kinds = (Path, str) if isinstance(path, Robot) else object
     check_order("tune(robot, path, controller)", (robot, Robot), (paths, kinds), (controller, str))
     _check_counts(draws, evaluations, path is None or paths)
-    kit, robot = instruments(sensors, robot), with_sensors(robot, sensors)
-    seconds = SECONDS if path is None and duration is None else duration
-    around = Circumstances(dt, seconds, min(SKIP, 0.5 * (seconds or SECONDS)), noise, delay, seed, sensors=kit)
+    seconds = options.get("duration", SECONDS if path is None else None)
+    around = circumstances(robot, (*TuneOptions.__annotations__,), **{"noise": NOISE, **options, "duration": seconds})
+    around = replace(around, skip=min(SKIP, 0.5 * (seconds or SECONDS)))
+    kit, seed = around.sensors or instruments(None, robot), around.seed
+    robot = with_sensors(robot, options.get("sensors"))
     spec = controller_spec(controller)
-    start = _start(spec, robot, dt)
+    start = _start(spec, robot, around.dt)
     follow, judged = [[path_named(item) for item in paths]] * 2 if paths else _paths(robot)
     uncertain = bool(known_errors(robot).keys)
     training, held_out = (
-        plausible(robot, draws, k) if uncertain else _near(robot, draws, k, 0.0 if kit.odometry else RADIUS)
+        _variants(
+            plausible(robot, draws, k) if uncertain else _near(robot, draws, k, 0.0 if kit.odometry else RADIUS), kit
+        )
         for k in (seed, seed + 1)
     )
     count, rest = 0, math.inf
@@ -265,15 +273,22 @@ def tune(
         progress(Report(f"trying {', '.join(f'{name} {_text(value)}' for name, value in gains.items())}"))
         score = _score(robot, training, follow, _with(spec, gains), around)
         rest = min(rest, MOST_RESTLESS * score.restless) if count == 1 else rest
-        return score.cost * max(1.0, score.restless / rest)
+        return score.cost * max(1.0, score.restless / rest) * (1.0 if is_steady(_with(spec, gains)) else UNSTEADY)
 
-    best = _search(start, TUNED[spec.controller], cost, evaluations)
+    def is_steady(settings: ControllerFile) -> bool:
+        control = settings.make(robot, **told_of_loop(robot, around))
+        return has_delay_margin(robot, control, around, LEAST_DELAY)
+
+    begin = start if is_steady(_with(spec, start)) else _start(replace(spec, options={}), robot, around.dt)
+    best = _search(begin, TUNED[spec.controller], cost, evaluations)
     old, new, fresh = _with(spec, start), _with(spec, best), replace(around, seed=seed + 1)
     before, tried = (_score(robot, held_out, judged, gains, fresh) for gains in (old, new))
-    if tried.cost > (1.0 - LEAST_GAIN) * before.cost:
+    if tried.cost > (1.0 - LEAST_GAIN) * before.cost and (is_steady(old) or not is_steady(new)):
         new = old
     after = before if new is old else tried
-    own_before, own_after = (_score(robot, [robot], judged, gains, fresh) for gains in (old, new))
+    itself = [_Variant(robot, kit)]
+    own_before, own_after = (_score(robot, itself, judged, gains, fresh) for gains in (old, new))
+    margins = loop_margins(robot, new.make(robot, **told_of_loop(robot, around)), around)
     names, judged_names = (tuple(route.name for route in routes) for routes in (follow, judged))
     source = f"tuned for {robot.name} on {all_of(names)}, {draws} draws, seed {seed}"
     return Tuned(
@@ -290,10 +305,11 @@ def tune(
         draws,
         uncertain,
         count,
-        noise,
-        delay,
-        dt,
+        around.noise,
+        around.delay,
+        around.dt,
         str(kit),
+        margins,
     )
 
 
@@ -329,6 +345,39 @@ def _paths(robot: Robot) -> tuple[list[Path], list[Path]]:
     period, turn = next(able, words[-1])
     training, held_out = ([path_named(name.format(period, turn)) for name in names] for names in (TRAINING, HELD_OUT))
     return training, held_out
+
+
+LATENCY, LEAST_DELAY = 0.01, 0.015  # [s]
+WORSE = 2.0  # times as few counts and new poses, as much noise
+UNSTEADY = 1e3  # times the cost of settings without that delay margin
+
+
+class _Variant(NamedTuple):
+    """A robot that is driven, and with which it is measured."""
+
+    plant: Robot
+    kit: Instruments
+
+
+def _variants(robots: Sequence[Robot], kit: Instruments) -> list[_Variant]:
+    """Robots in loops that may be: a little later, a little earlier with worse sensors, as they are."""
+    variants = []
+    for k, robot in enumerate(robots):
+        latency = max(0.0, robot.drive.latency + LATENCY * (1.0, -1.0, 0.0)[k % 3])
+        plant = robot.replace(drive=robot.drive.replace(latency=latency))
+        variants.append(_Variant(plant, _worse(kit) if k % 3 == 1 else kit))
+    return variants
+
+
+def _worse(kit: Instruments) -> Instruments:
+    """Sensors a step worse."""
+    sensors = kit.sensors
+    names = ("gyro_noise", "gyro_bias", "pose_noise", "heading_noise")
+    noise = {name: WORSE * value for name in names if (value := getattr(sensors, name)) is not None}
+    fewer = {name: value / WORSE for name in ("pose_rate",) if (value := getattr(sensors, name)) is not None}
+    counts = sensors.encoder_counts
+    rounded = {} if counts is None else {"encoder_counts": max(1.0, round(counts / WORSE))}
+    return replace(kit, sensors=sensors.replace(**noise, **fewer, **rounded))
 
 
 RESISTANCE, MASS, RADIUS = 0.15, 0.1, 0.003  # by which a robot may be off whose file says nothing of that
@@ -407,7 +456,7 @@ def _with(spec: ControllerFile, gains: Gains) -> ControllerFile:
 
 
 def _score(
-    robot: Robot, plants: Sequence[Robot], paths: Sequence[Path], spec: ControllerFile, around: Circumstances
+    robot: Robot, variants: Sequence[_Variant], paths: Sequence[Path], spec: ControllerFile, around: Circumstances
 ) -> TuningScore:
     """What a controller for one robot comes to when it drives the others, free and pushed."""
     control = spec.make(robot, **told_of_loop(robot, around))
@@ -418,11 +467,11 @@ def _score(
         for pushed in (False, True) if force.any() else (False,):
             row = []
             weights.append(PUSHED if pushed else 1.0)
-            for k, plant in enumerate(plants):
+            for k, (plant, kit) in enumerate(variants):
                 seed = [around.seed, k, len(rows)]
                 push = pushes(force, around.duration or path.duration, np.random.default_rng(seed)) if pushed else None
                 number = int(np.random.default_rng(seed).integers(2**31))
-                under = replace(around, seed=number, **({} if push is None else {"push": push}))
+                under = replace(around, seed=number, sensors=kit, **({} if push is None else {"push": push}))
                 row.append(tracked(plant, path, control, under))
             rows.append(row)
     runs = [run for row in rows for run in row]

@@ -11,7 +11,7 @@ from omnidyn.campaigns.results import Campaign
 from omnidyn.comparison.drift import Drift
 from omnidyn.comparison.model_bands import with_fitted_band
 from omnidyn.comparison.result import Comparison
-from omnidyn.control.tracking import Tracking, Trackings
+from omnidyn.control.tracking import Tracking
 from omnidyn.errors import InputError
 from omnidyn.findings.finding import Verdict
 from omnidyn.identification.estimate import Estimate
@@ -119,7 +119,6 @@ PICTURES: dict[type, Callable[..., Picture]] = {
     MotorStudy: _motors,
     SteadyStudy: draw_polar,
     Tracking: draw_tracking,
-    Trackings: draw_tracking,
     Campaign: draw_campaign,
     Plan: draw_plan,
 }

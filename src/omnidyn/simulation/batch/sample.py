@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.arguments import is_whole
+from omnidyn.arguments import Rng, is_whole, seed_of
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, COULOMB, DIRECTION, EMF, TORQUE, VISCOUS, Key, expand
@@ -85,7 +85,7 @@ class Sample(Sequence[Robot]):
 def sample(
     fit: Any,
     count: int,
-    seed: int = 0,
+    rng: Rng = 0,
     *,
     ranges: Mapping[str, tuple[float, float]] | None = None,
     factors: Mapping[str, tuple[float, float]] | None = None,
@@ -100,7 +100,7 @@ def sample(
     Args:
         fit: An estimate, or a robot.
         count: Number of robots.
-        seed: Of the draws.
+        rng: A seed or a numpy.random.Generator of the draws.
         ranges: Key of a robot file -> (low, high), in its unit; that of a list stands for each entry.
         factors: The same in shares of the value, such as (0.8, 1.2).
 
@@ -116,8 +116,7 @@ def sample(
         raise InputError("cannot draw robots from this", got=type(fit).__name__, expected="an estimate, or a robot")
     if not is_whole(count) or not 1 <= count <= MOST_DRAWS:
         raise InputError("strange number of draws", got=count, expected=f"1 to {MOST_DRAWS}", where="count")
-    if not is_whole(seed) or seed < 0:
-        raise InputError("no seed", got=seed, expected="a whole number, 0 or more", where="seed")
+    seed = seed_of(rng)
     if ranges is None and factors is None:
         draws = Draws(center, count, seed)
         keys, values = [str(key) for key in draws.keys], draws.values

@@ -14,7 +14,7 @@ import omnidyn
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.polyline import path_of_file, through
 from omnidyn.control.readings import with_sensors
-from omnidyn.control.tracking import Trackings, trackings_document
+from omnidyn.control.tracking import Tracking, trackings_document
 from omnidyn.document import plain
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
@@ -66,7 +66,7 @@ def _path(request: Mapping[str, Any], folder: FilePath) -> Path:
     return omnidyn.path(request["path"])
 
 
-def _motion(trackings: Trackings, robot: Robot) -> dict[str, Any]:
+def _motion(trackings: Tracking, robot: Robot) -> dict[str, Any]:
     """What the animation shows: poses [m, m, rad], distances from the path [mm], over time [s]; the robot [m]."""
     first = trackings[0]
     rows = np.unique(np.linspace(0, len(first.run) - 1, min(len(first.run), MAX_FRAMES)).astype(int))
@@ -84,7 +84,7 @@ def _motion(trackings: Trackings, robot: Robot) -> dict[str, Any]:
     )
 
 
-def _write_signals(trackings: Trackings, folder: FilePath) -> None:
+def _write_signals(trackings: Tracking, folder: FilePath) -> None:
     """Errors and voltages over time, a panel each, all controllers in each panel."""
     names = [tracking.controller for tracking in trackings]
     volts = [np.asarray(tracking.run.voltage).T for tracking in trackings]
