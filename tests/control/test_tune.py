@@ -7,7 +7,7 @@ import pytest
 
 import omnidyn
 from omnidyn.control import tune as tuning
-from omnidyn.control.closed_loop import Circumstances
+from omnidyn.control.circumstances import Circumstances
 from omnidyn.control.controllers import ControllerFile, load_controller, save_controller
 from omnidyn.control.instruments import Instruments
 from omnidyn.control.margins import loop_margins

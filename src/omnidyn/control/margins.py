@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
+from omnidyn.control.circumstances import Circumstances
 from omnidyn.control.controller import Controller
 from omnidyn.control.instruments import Instruments
 from omnidyn.control.paths.motion import Path, Reference
@@ -24,9 +24,6 @@ from omnidyn.model.frames import body_to_world
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds
 from omnidyn.simulation.live import LiveRobot
-
-if TYPE_CHECKING:
-    from omnidyn.control.closed_loop import Circumstances
 
 MOST_DELAY, MOST_GAIN = 0.06, 4.0  # [s]; times
 HALVINGS = 5

@@ -18,12 +18,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.control.closed_loop import Circumstances, circumstances, told_of_loop, tracked
+from omnidyn.control.circumstances import Circumstances, TuneOptions, circumstances
+from omnidyn.control.closed_loop import told_of_loop, tracked
 from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
 from omnidyn.control.demand import path_demand
 from omnidyn.control.instruments import Instruments, instruments
@@ -45,7 +46,6 @@ from omnidyn.progress import Progress, Report, silent
 from omnidyn.shown import Displayable
 from omnidyn.statement import NOTE, Statement, as_verdict
 
-LOOP = ("dt", "duration", "noise", "delay", "rng", "sensors")  # options of the loop
 DRAWS, EVALUATIONS, NOISE = 3, 30, 0.005
 MOST_DRAWS, MOST_EVALUATIONS = 1000, 10_000
 FACTORS, FARTHEST = (4.0, 2.0), 16.0  # by which a setting is changed, round by round; and from the start at the most
@@ -221,7 +221,7 @@ def tune(
     draws: int = DRAWS,
     evaluations: int = EVALUATIONS,
     progress: Progress = silent,
-    **options: Any,
+    **options: Unpack[TuneOptions],
 ) -> Tuned:
     """Find the settings of a controller by simulation, over the robots that the file says may be meant.
 
@@ -251,7 +251,7 @@ def tune(
     check_order("tune(robot, path, controller)", (robot, Robot), (paths, kinds), (controller, str))
     _check_counts(draws, evaluations, path is None or paths)
     seconds = options.get("duration", SECONDS if path is None else None)
-    around = circumstances(robot, LOOP, **{"noise": NOISE, **options, "duration": seconds})
+    around = circumstances(robot, (*TuneOptions.__annotations__,), **{"noise": NOISE, **options, "duration": seconds})
     around = replace(around, skip=min(SKIP, 0.5 * (seconds or SECONDS)))
     kit, seed = around.sensors or instruments(None, robot), around.seed
     robot = with_sensors(robot, options.get("sensors"))
