@@ -45,7 +45,7 @@ class Margins:
     gain: float
 
 
-class _Steady(Path):
+class _SteadyTwist(Path):
     """A twist in the frame of the body [m/s, m/s, rad/s] that never changes."""
 
     name, duration, end = "steady", SECONDS, np.inf
@@ -107,7 +107,7 @@ def _largest(settles: Callable[[float], bool]) -> float:
 
 def _settles(plant: Robot, controller: Controller, around: Circumstances, speeds: FloatArray, gain: float) -> bool:
     """Whether a loop does, its outputs so many times as strong."""
-    path, dt, kit = _Steady(speeds), around.dt, around.sensors or Instruments(plant.sensor_model)
+    path, dt, kit = _SteadyTwist(speeds), around.dt, around.sensors or Instruments(plant.sensor_model)
     still = kit.sensors.replace(
         encoder_counts=None, gyro_noise=None, gyro_bias=None, pose_noise=None, heading_noise=None
     )
