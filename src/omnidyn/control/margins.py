@@ -1,9 +1,9 @@
 """Margins: how much later its outputs may act, and how much stronger, before a loop no longer settles.
 
-A simulated robot slides along at a steady twist, a fifth too slow at first, and the loop is to take it there: it settles
-where its speeds scatter by no more than SETTLED after `SECONDS`. Both margins are found by halving: of an additional
-latency, and of a factor on all outputs. Sliding, no friction changes its direction: what settles here is the loop
-itself, whatever the controller is made of, with the sensors of the robot but without their noise.
+A simulated robot slides along at a steady twist, a fifth too slow at first, and the loop is to take it there: it
+settles where its speeds scatter by no more than SETTLED after `SECONDS`. Both margins are found by halving: of an
+additional latency, and of a factor on all outputs. Sliding, no friction changes its direction: what settles here is the
+loop itself, whatever the controller is made of, with the sensors of the robot but without their noise.
 """
 
 from __future__ import annotations

@@ -95,7 +95,8 @@ class Tuned(Displayable):
     before, after: of these and of those chosen, over robots, noise, pushes and paths that the search has not seen;
     tried: of the best of the search there. own_before, own_after: on the robot of the file itself.
     draws: robots the search drove; uncertain: whether the file says how far its numbers may be off: else they are near
-    it. margins: of the loop with the gains chosen. evaluations: gains that were tried. noise [m/s], delay [steps], dt [s], sensors: of the loops.
+    it. margins: of the loop with the gains chosen. evaluations: gains that were tried. noise [m/s], delay
+    [steps], dt [s], sensors: of the loops.
     """
 
     robot: str

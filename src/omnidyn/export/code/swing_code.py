@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib.resources import files
-from typing import Any
+from typing import Any, TypeGuard
 
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.pid import Pid
@@ -11,7 +11,7 @@ from omnidyn.control.swing import CHANGES, WINDOW
 from omnidyn.export.code.control_code import c_literal, c_literals
 
 
-def can_swing(law: Any) -> bool:
+def can_swing(law: Any) -> TypeGuard[Pid | Mpc]:
     """Whether it says that its loop swings."""
     return isinstance(law, Pid | Mpc)
 
