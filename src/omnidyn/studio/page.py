@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from nicegui import ui
 
+from omnidyn.studio.elements import verdict
 from omnidyn.studio.session import Session
 from omnidyn.studio.task import Task, progress_of
-from omnidyn.studio.worker import Worker
 
 
 class Page:
@@ -46,7 +46,36 @@ class Page:
         box = ui.expansion(title, value=is_open, on_value_change=lambda event: self.folded.update({name: event.value}))
         return box.classes("box")
 
-    def progress(self, part: str, task: Callable[[], Task], worker: Worker) -> None:
+    def stopped(self, task: Task, name: str, again: Callable[[], Any]) -> None:
+        """Why a task has no result, and a button that begins it again where nothing else is to be done.
+
+        name: of the verdict's id. again: makes what does the task again.
+        """
+        if task.error:
+            verdict("error", task.error, name)
+        elif task.stopped:
+            verdict("warning", "Cancelled: there is no result.", f"{name}-cancelled")
+        if task.stopped:
+            ui.button("Run again", on_click=lambda: self.session.start(again())).props(
+                f"outline no-caps id={name}-again"
+            )
+
+    def busy(self, work: Callable[[], Awaitable[Any]], trouble: ui.label | None = None) -> Callable[[Any], Any]:
+        """What a button does, which shows that it works until the work is done. trouble: shows what it returns."""
+
+        async def act(event: Any) -> None:
+            button = event.sender.props("loading")
+            words = await work()
+            if not button.is_deleted:  # the part may have been made again
+                button.props(remove="loading")
+            if trouble is not None and not trouble.is_deleted:
+                trouble.text = words
+            elif words:
+                ui.notify(words, type="negative", timeout=0, close_button="Close")
+
+        return act
+
+    def progress(self, part: str, task: Callable[[], Task], worker: str) -> None:
         """How far the task of a part is, and a button that cancels it.
 
         The button stays the same while the words beside it change: a click takes longer than they stand.
@@ -57,14 +86,15 @@ class Page:
                 left = "" if task().left is None else f", about {task().left:.0f} s left"
                 with ui.row().classes("line"):
                     ui.spinner(size="1.2em")
-                    ui.label(task().progress).props(f"id={part}-progress")
+                    words = "cancelling" if task().cancelling else task().progress
+                    ui.label(words).props(f"id={part}-progress")
                     ui.label(f"{task().spent:.0f} s{left}").classes("quiet").props(f"id={part}-time")
 
         def button() -> None:
             if task().running:
-                ui.button("Cancel", on_click=lambda: self.session.start(worker.cancel())).props(
-                    f"outline dense no-caps id=cancel-{part}"
-                )
+                ui.button(
+                    "Cancel", on_click=lambda: self.session.start(task().cancel(self.session, part, worker))
+                ).props(f"outline dense no-caps id=cancel-{part}")
 
         def bar() -> None:
             share = task().share

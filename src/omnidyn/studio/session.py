@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import inspect
 import itertools
+import json
 import re
 import sys
 import tempfile
@@ -22,7 +23,7 @@ from omnidyn.progress import Report
 from omnidyn.studio.calls import LogFile
 from omnidyn.studio.parts import COMPARE, FIT, LOGS, PROGRESS, ROBOT, TRACK
 from omnidyn.studio.series import META, Series
-from omnidyn.studio.worker import CancelledError, JobError, Worker
+from omnidyn.studio.worker import CancelledError, EndedError, JobError, Worker
 
 MAX_FILES, MAX_FILE_BYTES, MAX_BYTES = 50, 2**30, 4 * 2**30  # of uploads
 ROBOT_SUFFIX = ".toml"
@@ -130,6 +131,10 @@ class Session:
                 path.unlink(missing_ok=True)
         return safe
 
+    def without_paths(self, result: Any) -> Any:
+        """A result of a job, its words as pages show them."""
+        return json.loads(self.shown(json.dumps(result)))
+
     def make_room(self, count: int, size: int) -> None:
         """Count files that lie in the folder of the session [bytes]. Raises RefusedError for too many."""
         if len(self.logs) + len(self.robots) + self.others + count > MAX_FILES or self._bytes + size > MAX_BYTES:
@@ -141,8 +146,11 @@ class Session:
         return self.takers.get(kind, self.add_log)
 
     def shown(self, words: str) -> str:
-        """Words without the folders of uploads and results."""
-        return re.sub(rf"{re.escape(str(self.folder))}/(?:\d+/)+", "", words)
+        """Words without the folders of uploads, of results, and of files that the command line named."""
+        words = re.sub(rf"{re.escape(str(self.folder))}/(?:\d+/)+", "", words)
+        for path in (*(log.path for log in self.logs.values()), *self.robots.values()):
+            words = words.replace(path, Path(path).name)
+        return words
 
     def remove(self, log: LogFile) -> None:
         """Forget a log; one that was uploaded is deleted."""
@@ -153,20 +161,24 @@ class Session:
             path.unlink(missing_ok=True)
         self.changed(LOGS, FIT)
 
-    async def example(self) -> None:
-        """A simulated log to begin with."""
+    async def example(self) -> str:
+        """A simulated log to begin with; an error in words, or ""."""
         path = self.new_folder() / "example.csv"
-        await self.workers["log"].run("example", {"path": str(path)}, lambda kind, value: None)
+        try:
+            await self.workers["log"].ask("example", {"path": str(path)})
+        except (JobError, CancelledError) as error:
+            return str(error)
         self.robot = self.robot or "axebot"
         self.add_log(str(path), path.name)
         self.changed(ROBOT)
+        return ""
 
     async def check(self, log: LogFile) -> None:
         """Read and check a log again."""
         log.version += 1
         version = log.version
         folder = self.new_folder() / "series"
-        log.error, log.result, log.progress = "", None, str(Report(f"reading {log.label}"))
+        log.error, log.ended, log.result, log.progress = "", False, None, str(Report(f"reading {log.label}"))
         self.changed(LOGS, FIT)
 
         def listen(kind: str, value: Any) -> None:
@@ -179,11 +191,11 @@ class Session:
         try:
             result = await self.workers["log"].run("check", request, listen)
         except JobError as error:
-            result, log.error = None, str(error).replace(f"{Path(log.path).parent}/", "")
-        except CancelledError:
-            return
+            result, log.error, log.ended = None, self.shown(str(error)), isinstance(error, EndedError)
+        except CancelledError as error:
+            result, log.error, log.ended = None, str(error), True
         if version == log.version:
-            log.result, log.progress = result, ""
+            log.result, log.progress = self.without_paths(result), ""
             self.changed(LOGS, FIT)
 
     def _take_series(self, log: LogFile, folder: Path) -> None:
@@ -197,8 +209,8 @@ class Session:
         """Read a log by a table of columns; an error in words, or ""."""
         path = self.new_folder() / "columns.toml"
         try:
-            await self.workers["log"].run("save_columns", {"rows": rows, "path": str(path)}, lambda kind, value: None)
-        except JobError as error:
+            await self.workers["log"].ask("save_columns", {"rows": rows, "path": str(path)})
+        except (JobError, CancelledError) as error:
             return str(error)
         log.map = str(path)
         await self.check(log)
@@ -217,11 +229,9 @@ class Session:
         """Put the other log on the clock of a log, by what both recorded."""
         request = {"robot": self.robot_path, "logs": [one.request for one in (log, self.logs[log.other])]}
         try:
-            aligned = await self.workers["log"].run("align", request, lambda kind, value: None)
+            aligned = self.without_paths(await self.workers["log"].ask("align", request))
         except (JobError, CancelledError) as error:
-            aligned = {"severity": "error", "verdict": str(error)}
-        for one in (log, self.logs[log.other]):
-            aligned["verdict"] = aligned["verdict"].replace(one.path, one.label)
+            aligned = {"severity": "error", "verdict": self.shown(str(error))}
         log.aligned, log.offset = aligned, float(aligned.get("offset", log.offset))
         self.changed(LOGS)
 
@@ -270,9 +280,10 @@ class Session:
             stdout=asyncio.subprocess.DEVNULL,
             stderr=asyncio.subprocess.PIPE,
         )
-        _, words = await process.communicate()
+        _, said = await process.communicate()
         if process.returncode:
-            return words.decode("utf-8", "replace").strip().removeprefix("omnidyn: error: ")
+            words = said.decode("utf-8", "replace").strip().removeprefix("omnidyn: error: ")
+            return self.shown(words) or str(EndedError(process.returncode))
         self.add_robot(str(path), path.name)
         return ""
 

@@ -27,12 +27,12 @@ class CompareTab:
         page.part(self._robots, ROBOT)  # apart: a log that was just read takes no choice away
         page.part(self._logs, LOGS)
         page.part(self._start, COMPARE, COMPARE_START, LOGS, ROBOT)
-        page.progress(COMPARE, lambda: self.comparing.last, self.session.workers[COMPARE])
+        page.progress(COMPARE, lambda: self.comparing.last, COMPARE)
         page.part(self._result, COMPARE)
         ui.label("Drift: what changed between fits of one robot").classes("title").props("role=heading aria-level=2")
         page.part(self._fits, ROBOT)
         page.part(self._start_drift, DRIFT, COMPARE_START, ROBOT)
-        page.progress(DRIFT, lambda: self.comparing.last_drift, self.session.workers[COMPARE])
+        page.progress(DRIFT, lambda: self.comparing.last_drift, COMPARE)
         page.part(self._drift, DRIFT)
 
     def _robots(self) -> None:
@@ -77,8 +77,7 @@ class CompareTab:
 
     def _result(self) -> None:
         task = self.comparing.last
-        if task.error:
-            verdict("error", task.error, "compare-verdict")
+        self.page.stopped(task, "compare-verdict", self.comparing.run)
         if task.result is None:
             return
         result = task.result
@@ -132,8 +131,7 @@ class CompareTab:
 
     def _drift(self) -> None:
         task = self.comparing.last_drift
-        if task.error:
-            verdict("error", task.error, "drift-verdict")
+        self.page.stopped(task, "drift-verdict", self.comparing.run_drift)
         if task.result is None:
             return
         verdict(task.result["severity"], task.result["verdict"], "drift-verdict")

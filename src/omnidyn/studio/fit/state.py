@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import shutil
 from typing import Any
 
@@ -41,11 +40,14 @@ class Fitting:
             self.session.start(self._choose(self._choices_of))
 
     async def _choose(self, robot: str) -> None:
-        with contextlib.suppress(JobError, CancelledError):
-            choices = await self.session.workers["log"].run("free_keys", {"robot": robot}, lambda kind, value: None)
-            if robot == self._choices_of:
-                self.choices, self.free = choices, [key for key, _ in choices["default"]]
-                self.session.changed(FREE, FIT)
+        try:
+            choices = await self.session.workers["log"].ask("free_keys", {"robot": robot})
+        except (JobError, CancelledError):
+            self._choices_of = ""  # asked again with the next change; until then `identify` chooses
+            return
+        if robot == self._choices_of:
+            self.choices, self.free = choices, [key for key, _ in choices["default"]]
+            self.session.changed(FREE, FIT)
 
     def set_free(self, keys: list[str]) -> None:
         """Fit these numbers, in the order in which they are offered."""

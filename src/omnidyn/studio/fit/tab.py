@@ -40,7 +40,7 @@ class FitTab:
             self._robot_form()
         self.page.part(self._choices, FREE, LOGS, ROBOT)
         self.page.part(self._start, FIT, LOGS)
-        self.page.progress(FIT, lambda: self.fitting.last, self.session.workers["fit"])
+        self.page.progress(FIT, lambda: self.fitting.last, "fit")
         self.page.part(self._result, FIT)
 
     def _robot_form(self) -> None:
@@ -73,11 +73,11 @@ class FitTab:
             inputs[flag].on_value_change(draw)
         trouble = ui.label().classes("text error-text")
 
-        async def make() -> None:
+        async def make() -> str:
             options = [f"{flag}={field.value}" for flag, field in inputs.items() if str(field.value or "").strip()]
-            trouble.text = await self.session.make_robot(name.value or "", options)
+            return await self.session.make_robot(name.value or "", options)
 
-        ui.button("Make this robot", on_click=make).props("outline no-caps id=make-robot")
+        ui.button("Make this robot", on_click=self.page.busy(make, trouble)).props("outline no-caps id=make-robot")
         ui.label("What is left empty is guessed, with a wide spread, and marked as a guess.").classes("text quiet")
 
     def _choices(self) -> None:
@@ -125,8 +125,7 @@ class FitTab:
 
     def _result(self) -> None:
         fit = self.fitting.last
-        if fit.error:
-            verdict("error", fit.error)
+        self.page.stopped(fit, "fit-stopped", self.fitting.run)
         if fit.result is None:
             return
         result = fit.result

@@ -35,7 +35,7 @@ class TrackTab:
         self.page.part(self._path, PATH)
         self.page.part(self._loop, PATH, ROBOT)
         self.page.part(self._start, TRACK, TRACK_START, PATH, ROBOT)
-        self.page.progress(TRACK, lambda: self.tracks.last, self.session.workers[TRACK])
+        self.page.progress(TRACK, lambda: self.tracks.last, TRACK)
         self.page.part(self._result, TRACK)
 
     def _path(self) -> None:
@@ -109,8 +109,7 @@ class TrackTab:
 
     def _result(self) -> None:
         task = self.tracks.last
-        if task.error:
-            verdict("error", task.error, "track-verdict")
+        self.page.stopped(task, "track-verdict", self.tracks.run)
         if task.result is None:
             return
         result = task.result
