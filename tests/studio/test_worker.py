@@ -63,7 +63,7 @@ def test_a_check_and_a_fit_that_were_ended_are_said_and_run_again(tmp_path):
         session = Session()
         fitting, log = Fitting(session), session.add_log(str(write_log(tmp_path / "log.csv", 20.0)), "log.csv")
         session.robot = "axebot"
-        await finished(lambda: session.workers["log"].busy)
+        await finished(lambda: session.workers["log"]._process is not None)
         kill(session.workers["log"])
         await finished(lambda: log.ended)
         assert "run it again" in log.error

@@ -12,6 +12,7 @@ import numpy as np
 
 import omnidyn
 from omnidyn.cli import main
+from omnidyn.document import in_clauses
 from tests.support.axebot_logs import excitation
 
 
@@ -45,9 +46,15 @@ def tab(page, name):
 
 
 def verdict(page, name="#verdict"):
-    """The sentence on top, without the mark before it."""
+    """The verdict on top, as `laid_out` writes it, without the mark before it."""
     page.wait_for_selector(name)
-    return page.inner_text(f"{name} .text")
+    return "\n".join(page.locator(f"{name} .text").all_inner_texts())
+
+
+def laid_out(words):
+    """A verdict as a page has it: its line, then a line for each point."""
+    line, clauses = in_clauses(words)
+    return "\n".join((line, *clauses))
 
 
 def as_flags(text):

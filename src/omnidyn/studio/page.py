@@ -9,15 +9,26 @@ from typing import Any
 from nicegui import ui
 
 from omnidyn.studio.elements import verdict
+from omnidyn.studio.fit.state import Fitting
+from omnidyn.studio.parts import FIT, LOGS, ROBOT
 from omnidyn.studio.session import Session
+from omnidyn.studio.steps import DONE, steps
 from omnidyn.studio.task import Task, progress_of
+
+STEPS = (  # what a newcomer does: title, and words
+    ("1. Log", "Drop a recording of your robot: CSV, Parquet, a ROS bag, MATLAB, WPILOG. It stays on this machine."),
+    ("2. Robot", "Choose a robot file, or describe where its wheels stand and what it weighs."),
+    ("3. Fit", "Friction and motor numbers with intervals, as a robot file to drive, track and compare with."),
+)
 
 
 class Page:
     """One browser tab. parts: what is made again when a part of the session changes."""
 
-    def __init__(self, session: Session) -> None:
-        self.session = session
+    def __init__(self, session: Session, fitting: Fitting) -> None:
+        self.session, self.fitting, self.client = session, fitting, ui.context.client
+        self.stale = set[str]()  # parts that changed while nobody was connected
+        self.client.on_connect(self.catch_up)
         self.parts: dict[str, list[Any]] = {}
         self.tabs: ui.tabs | None = None
         self.folded: dict[str, bool] = {}  # title -> whether it is open
@@ -28,9 +39,51 @@ class Page:
         self.tabs.set_value(name)
 
     def changed(self, part: str) -> None:
-        """Show a part anew."""
+        """Show a part anew: at once, or when somebody is connected again."""
+        if not self.client.has_socket_connection:
+            self.stale.add(part)
+            return
         for refresh in self.parts.get(part, ()):
             refresh()
+
+    def catch_up(self) -> None:
+        """Show what changed while nobody was connected."""
+        parts, self.stale = self.stale, set()
+        for part in parts:
+            self.changed(part)
+
+    def next_step(self, name: str) -> None:
+        """What comes after this tab, as its one primary button; on a tab that is not done, what is missing."""
+
+        def show() -> None:
+            line = steps(self.session, self.fitting)
+            names = [step.name for step in line]
+            here, after = line[names.index(name)], line[names.index(name) + 1]
+            if here.state != DONE:
+                return
+            with ui.row().classes("line"):
+                ui.button(f"Next: {after.name}", on_click=lambda: self.go(after.name)).props(
+                    f"unelevated no-caps id=next-{name.lower()}"
+                )
+
+        self.part(show, LOGS, ROBOT, FIT)
+
+    def empty(self, name: str) -> None:
+        """The three steps, and a picture, where this tab has nothing to show yet."""
+
+        def show() -> None:
+            line = steps(self.session, self.fitting)
+            if all(step.state == DONE for step in line[: 1 if name == "Log" else 2]):
+                return
+            with ui.element("div").classes("empty"):
+                ui.image("/static/steps.svg").props("alt='A robot seen from above, its log, and the fitted curve'")
+                with ui.element("ol"):
+                    for step, words in zip(line, STEPS, strict=False):
+                        with ui.element("li").classes(step.state):
+                            ui.label(f"{words[0]} ({step.words})").classes("strong")
+                            ui.label(words[1]).classes("quiet")
+
+        self.part(show, LOGS, ROBOT, FIT)
 
     def part(self, make: Callable[[], None], *parts: str) -> None:
         """A piece of the page that is made again when one of these parts of the session changes."""

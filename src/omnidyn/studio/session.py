@@ -12,6 +12,7 @@ import inspect
 import itertools
 import json
 import re
+import shutil
 import sys
 import tempfile
 from collections.abc import AsyncIterator, Callable
@@ -19,6 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import omnidyn
+from omnidyn.errors import InputError
+from omnidyn.model.presets import robot_path
 from omnidyn.progress import Report
 from omnidyn.studio.calls import LogFile
 from omnidyn.studio.parts import COMPARE, FIT, LOGS, PROGRESS, ROBOT, TRACK
@@ -42,12 +45,13 @@ class Session:
         self.folder = Path(self._folder.name)
         self.logs: dict[str, LogFile] = {}
         self.robots = {name: name for name in omnidyn.preset_names()}  # shown name -> preset or path
+        self.presets = (*self.robots,)
         self.robot = ""
         self.series: dict[str, Series] = {}
         self.listeners: set[Callable[[str], None]] = set()
         self.workers = {name: Worker() for name in ("log", "fit", "drive", TRACK, COMPARE, "warm")}
         self.others = 0  # files that are neither logs nor robots
-        self.takers: dict[str, Callable[[str, str], object]] = {"": self.add_log, ROBOT_SUFFIX: self.add_robot}
+        self.takers: dict[str, Callable[[str, str], object]] = {"": self.add_log, ROBOT_SUFFIX: self.take_robot}
         self.count, self._bytes, self._tasks = 0, 0, set[asyncio.Task[Any]]()
 
     def changed(self, *parts: str) -> None:
@@ -252,10 +256,56 @@ class Session:
         """The preset or the path of the robot; "" for none."""
         return self.robots.get(self.robot, "")
 
+    def is_file(self, name: str) -> bool:
+        """Whether a robot is a file, not a preset."""
+        return self.robots.get(name, name) not in self.presets
+
+    def robot_text(self, name: str) -> str:
+        """The file of a robot."""
+        return Path(robot_path(self.robots[name])).read_text("utf-8", "replace")
+
     def add_robot(self, path: str, name: str) -> None:
-        """Take a robot file, and choose it."""
-        self.robots[name] = path
+        """Take a robot file, and choose it; logs are checked with it, also where one of this name was chosen before."""
+        self.robots[name], self.robot = path, ""
         self.choose(name)
+
+    async def take_robot(self, path: str, name: str, *, choose: bool = True) -> None:
+        """Take a copy of a robot file that was dropped. Raises InputError for what is none."""
+        try:
+            await self.workers["log"].ask("check_robot", {"path": path})
+        except (JobError, CancelledError) as error:
+            raise InputError(self.shown(str(error).removeprefix(f"{path}: "))) from None
+        kept = shutil.copyfile(path, self.new_folder() / name)
+        self._bytes += kept.stat().st_size
+        if choose:
+            self.add_robot(str(kept), name)
+        else:
+            self.robots[self.free_name(name)] = str(kept)
+            self.changed(ROBOT)
+
+    async def keep_robot(self, text: str, name: str, of: str) -> str:
+        """Keep a text as a robot file; an error in words, or "". of: the robot it was made of, which gets this name."""
+        name = f"{safe_name(name.removesuffix(ROBOT_SUFFIX))}{ROBOT_SUFFIX}"
+        if name != of and name in self.robots:
+            return str(InputError("there is a robot of this name", got=name, remedy="use another name"))
+        path = self.new_folder() / name
+        path.write_text(text, "utf-8")
+        before = of if name != of and self.is_file(of) else ""
+        try:
+            await self.take_robot(str(path), name)
+        except InputError as error:
+            return str(error)
+        if before:
+            self.robots.pop(before)
+            self.changed(ROBOT)
+        return ""
+
+    def remove_robot(self, name: str) -> None:
+        """Forget a robot file."""
+        self.robots.pop(name, None)
+        if self.robot == name:
+            self.robot = ""
+        self.changed(ROBOT, FIT)
 
     def free_name(self, name: str) -> str:
         """The name, or the next one that no robot has yet."""

@@ -24,6 +24,7 @@ class CompareTab:
     def build(self) -> None:
         """Lay it out."""
         page = self.page
+        page.empty("Compare")
         page.part(self._robots, ROBOT)  # apart: a log that was just read takes no choice away
         page.part(self._logs, LOGS)
         page.part(self._start, COMPARE, COMPARE_START, LOGS, ROBOT)
@@ -71,7 +72,7 @@ class CompareTab:
         code = comparing.why_not()
         with ui.row().classes("line"):
             button = ui.button("Compare", on_click=lambda: self.session.start(comparing.run()))
-            button.props("outline no-caps id=compare").set_enabled(not code and not comparing.last.running)
+            button.props("unelevated no-caps id=compare").set_enabled(not code and not comparing.last.running)
             if code:
                 ui.label(WHY[code]).classes("text quiet").props("id=why-compare")
 

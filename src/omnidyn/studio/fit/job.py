@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from omnidyn.identification.output_error.prepare import free_by_default, guesses
 from omnidyn.model.keys import EMF, ROTOR, TORQUE, Key, find_key, in_words, unit
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
+from omnidyn.statement import ERROR, SEVERITIES, Statement
 from omnidyn.studio.job import Tell, options_of, robot_of, timed, write_free_runs
 from omnidyn.studio.series import SERIES
 
@@ -77,6 +78,7 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     shown = {
         "verdict": result.headline,
         "failed": bool(result.failures),
+        "severity": ERROR if result.failures else gravest(result.outcome()),
         "interrupted": result.interrupted,
         "numbers": {"head": list(table.head), "rows": [list(row) for row in table.rows]},
         "values": {name: float(value) for name, value in estimate.value.items()},
@@ -87,6 +89,11 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     }
     shown["report"] = _write_report(result, request, folder / "report.html")
     return shown
+
+
+def gravest(statements: Sequence[Statement]) -> str:
+    """The severity of the gravest statement."""
+    return min((statement.severity for statement in statements), key=SEVERITIES.index)
 
 
 def _numbers(estimate: Estimate) -> Table:

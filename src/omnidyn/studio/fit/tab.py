@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from omnidyn.model.wheels import ROBOT_RADII, WHEEL_RADII
 from omnidyn.studio.elements import table, verdict
 from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.page import Page
@@ -22,11 +21,6 @@ WHY = {
 }
 
 
-def _range(limits: tuple[float, float]) -> str:
-    """What robots have."""
-    return f"{limits[0]:g} to {limits[1]:g}"
-
-
 class FitTab:
     """The tab of one page."""
 
@@ -35,50 +29,12 @@ class FitTab:
 
     def build(self) -> None:
         """Lay it out."""
+        self.page.empty("Fit")
         self.page.part(self.page.robot_choice, ROBOT)
-        with self.page.box("Describe another robot"):
-            self._robot_form()
         self.page.part(self._choices, FREE, LOGS, ROBOT)
         self.page.part(self._start, FIT, LOGS)
         self.page.progress(FIT, lambda: self.fitting.last, "fit")
         self.page.part(self._result, FIT)
-
-    def _robot_form(self) -> None:
-        """What `init` asks for, within what robots have, and the robot as it is described."""
-        fields = {
-            "--azimuth": ("wheels stand at [degree]", "60,180,300", "0 is forward, 90 left"),
-            "--wheel-radius": ("radius of a wheel [m]", "0.05", _range(WHEEL_RADII)),
-            "--robot-radius": ("centre to wheel [m]", "0.15", _range(ROBOT_RADII)),
-            "--mass": ("mass [kg]", "3", ""),
-            "--voltage-limit": ("voltage limit [V]", "", "a guess where it is empty"),
-            "--gear-ratio": ("gear ratio [1]", "", "a guess where it is empty"),
-        }
-        with ui.element("div").classes("form"):
-            with ui.row().classes("line"):
-                name = ui.input("name", value="my-robot")
-                inputs = {
-                    flag: ui.input(words, value=value).props(f"hint='{hint}'")
-                    for flag, (words, value, hint) in fields.items()
-                }
-            picture = ui.element("omni-robot")
-        drawn = ("--azimuth", "--wheel-radius", "--robot-radius")
-
-        def draw() -> None:
-            for flag in drawn:
-                picture._props[f"data{flag[1:]}"] = str(inputs[flag].value or "")
-            picture.update()
-
-        draw()
-        for flag in drawn:
-            inputs[flag].on_value_change(draw)
-        trouble = ui.label().classes("text error-text")
-
-        async def make() -> str:
-            options = [f"{flag}={field.value}" for flag, field in inputs.items() if str(field.value or "").strip()]
-            return await self.session.make_robot(name.value or "", options)
-
-        ui.button("Make this robot", on_click=self.page.busy(make, trouble)).props("outline no-caps id=make-robot")
-        ui.label("What is left empty is guessed, with a wide spread, and marked as a guess.").classes("text quiet")
 
     def _choices(self) -> None:
         """What is held out, and what is fitted; not made again while somebody chooses."""
@@ -100,7 +56,7 @@ class FitTab:
         code, words = self.fitting.why_not()
         with ui.row().classes("line"):
             button = ui.button("Fit", on_click=lambda: session.start(self.fitting.run())).props(
-                "outline no-caps id=fit"
+                "unelevated no-caps id=fit"
             )
             button.set_enabled(not code and not self.fitting.last.running)
             if code:
@@ -129,7 +85,7 @@ class FitTab:
         if fit.result is None:
             return
         result = fit.result
-        verdict("error" if result["failed"] else "note", result["verdict"], "fit-verdict")
+        verdict(result["severity"], result["verdict"], "fit-verdict")
         with ui.row().classes("line"):
             ui.link("Robot file", "/fit/robot.toml").props("download")
             ui.link("Numbers (CSV)", "/fit/numbers.csv").props("download")

@@ -27,8 +27,10 @@ class LogTab:
             ui.button("Use the example log", on_click=self.page.busy(self.session.example)).props(
                 "outline no-caps id=example"
             )
+        self.page.empty("Log")
         self.page.part(self._choice, LOGS)
         self.page.part(self._progress, LOGS, PROGRESS)
+        self.page.next_step("Log")
         self.page.part(self._content, LOGS)
 
     def _log(self) -> LogFile | None:
@@ -39,9 +41,6 @@ class LogTab:
     def _choice(self) -> None:
         log = self._log()
         if log is None:
-            ui.label(
-                "No log yet. Drop a file here: CSV, Parquet, a ROS bag, MATLAB, WPILOG. It stays on this machine."
-            ).classes("quiet")
             return
         with ui.row().classes("line"):
             names = {key: other.label for key, other in self.session.logs.items()}

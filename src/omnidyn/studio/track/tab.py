@@ -103,7 +103,7 @@ class TrackTab:
         code = self.tracks.why_not()
         with ui.row().classes("line"):
             button = ui.button("Track", on_click=lambda: self.session.start(self.tracks.run()))
-            button.props("outline no-caps id=track").set_enabled(not code and not self.tracks.last.running)
+            button.props("unelevated no-caps id=track").set_enabled(not code and not self.tracks.last.running)
             if code:
                 ui.label(WHY[code]).classes("text quiet").props("id=why-track")
 
