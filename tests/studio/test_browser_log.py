@@ -63,9 +63,7 @@ def test_two_logs_are_put_on_one_time_axis(browser, tmp_path):
     assert page.inner_text("#align-call") == f"omnidyn align {first} {second}"
     choose_robot(page, "axebot")
     page.wait_for_selector("#fit:not([disabled])")
-    page.click(".held-out")
-    page.get_by_role("option", name="camera.csv").click()
-    page.keyboard.press("Escape")
+    page.get_by_label("use of camera.csv").get_by_text("hold out").click()
     page.click("#fit:not([disabled])")
     words = verdict(page, "#fit-verdict")
     said = command("identify", first, second, "--hold-out", second, "--robot", "axebot", "--json")[0]

@@ -72,13 +72,13 @@ def test_a_check_and_a_fit_that_were_ended_are_said_and_run_again(tmp_path):
         await session.check(log)
         assert fitting.why_not() == ("", "")
         fit = asyncio.create_task(fitting.run())
-        await finished(lambda: fitting.last.progress.startswith(("reading", "fitting")))
+        await finished(lambda: fitting.last.running and fitting.last.progress.startswith(("reading", "fitting")))
         kill(session.workers["fit"])
         await fit
         assert fitting.last.stopped
         assert "run it again" in fitting.last.error
         fit = asyncio.create_task(fitting.run())
-        await finished(lambda: fitting.last.progress.startswith(("reading", "fitting")))
+        await finished(lambda: fitting.last.running and fitting.last.progress.startswith(("reading", "fitting")))
         await fitting.last.cancel(session, "fit", "fit")
         await fit
         assert fitting.last.stopped or fitting.last.result["interrupted"]

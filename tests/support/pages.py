@@ -104,5 +104,10 @@ def shown(page, name):
     with contextlib.suppress(ImportError):
         from axe_playwright_python.sync_playwright import Axe
 
-        faults = [v["id"] for v in Axe().run(page).response["violations"] if v["impact"] in ("serious", "critical")]
-        assert not faults
+        found = Axe().run(page).response["violations"]
+        faults = [
+            f"{fault['id']}: {[node['html'] for node in fault['nodes']][:3]}"
+            for fault in found
+            if fault["impact"] in ("serious", "critical")
+        ]
+        assert not faults, faults

@@ -100,8 +100,11 @@ def show(studio: Studio, tab: str = "") -> None:
         """Where each step stands, on its tab, and what to do next."""
         all_steps = steps(session, studio.fitting)
         for step in all_steps:
-            marks[step.name].text = f"{MARKS[step.state]} {step.words}"
-            marks[step.name].classes(replace=f"state {step.state}")
+            mark, words = marks[step.name]
+            mark.set_text(MARKS[step.state])
+            words.set_text(step.words)
+            for label, name in ((mark, "state"), (words, "state more")):
+                label.classes(replace=f"{name} {step.state}")
         if after := following(all_steps):
             with ui.row().classes("line next").props("role=status id=next"):
                 ui.label(f"Next: {after.next}.").classes("text")
@@ -120,10 +123,10 @@ def show(studio: Studio, tab: str = "") -> None:
         ui.label(f"omnidyn studio {workspace.FILE_NAME}").classes("code")
 
 
-def _tab(name: str) -> ui.label:
-    """A tab, and the label on it that says how far its step is."""
-    with ui.tab(name):
-        return ui.label().classes("state").props("aria-hidden=true")
+def _tab(name: str) -> tuple[ui.label, ui.label]:
+    """A tab; the labels on it that say how far its step is: a mark, and words."""
+    with ui.tab(name), ui.row().classes("gap-1 no-wrap").props("aria-hidden=true"):
+        return ui.label(), ui.label()
 
 
 def _keep_address(page: Page) -> None:

@@ -27,6 +27,8 @@ class Page:
 
     def __init__(self, session: Session, fitting: Fitting) -> None:
         self.session, self.fitting, self.client = session, fitting, ui.context.client
+        # part -> label of a choice -> what lets it follow another page
+        self.mirrors: dict[str, dict[str, Callable[[], None]]] = {}
         self.stale = set[str]()  # parts that changed while nobody was connected
         self.client.on_connect(self.catch_up)
         self.parts: dict[str, list[Any]] = {}
@@ -43,7 +45,7 @@ class Page:
         if not self.client.has_socket_connection:
             self.stale.add(part)
             return
-        for refresh in self.parts.get(part, ()):
+        for refresh in (*self.parts.get(part, ()), *self.mirrors.get(part, {}).values()):
             refresh()
 
     def catch_up(self) -> None:
@@ -57,10 +59,10 @@ class Page:
 
         def show() -> None:
             line = steps(self.session, self.fitting)
-            names = [step.name for step in line]
-            here, after = line[names.index(name)], line[names.index(name) + 1]
-            if here.state != DONE:
+            places = {step.name: k for k, step in enumerate(line)}
+            if line[places[name]].state != DONE:
                 return
+            after = next(step for step in line[places[name] + 1 :] if step.state != DONE)
             with ui.row().classes("line"):
                 ui.button(f"Next: {after.name}", on_click=lambda: self.go(after.name)).props(
                     f"unelevated no-caps id=next-{name.lower()}"
@@ -91,6 +93,15 @@ class Page:
         shown()
         for part in parts:
             self.parts.setdefault(part, []).append(shown.refresh)
+
+    def mirror(self, choice: Any, part: str, get: Callable[[], Any]) -> None:
+        """Let a choice show what another page chose when a part changes; it is not made again: it may be open."""
+
+        def follow() -> None:
+            if not choice.is_deleted and choice.value != get():
+                choice.set_value(get())
+
+        self.mirrors.setdefault(part, {})[choice.props["label"]] = follow
 
     def box(self, title: str, is_open: bool = False) -> ui.expansion:
         """A part that can be folded; it stays as it was when it is made again."""

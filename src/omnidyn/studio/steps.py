@@ -8,6 +8,7 @@ from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.session import Session
 
 DONE, WORKING, READY, WAITING, WRONG = "done", "working", "ready", "waiting", "wrong"
+NEEDS = {"no_log": "needs a log", "no_robot": "needs a robot"}
 MARKS = {DONE: "✓", WORKING: "…", READY: "○", WAITING: "–", WRONG: "✕"}
 
 
@@ -63,5 +64,5 @@ def _fit(fitting: Fitting) -> Step:
     if last.error or last.stopped:
         return Step("Fit", WRONG, "stopped", "run the fit again")
     if why:
-        return Step("Fit", WAITING, "waits for a log and a robot")
+        return Step("Fit", WAITING, NEEDS.get(why, "not yet"))
     return Step("Fit", READY, "ready", "fit the robot to the logs")

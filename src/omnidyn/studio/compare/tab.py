@@ -41,31 +41,37 @@ class CompareTab:
         comparing, session = self.comparing, self.session
         first, second = comparing.robots
         with ui.row().classes("line"):
-            ui.select(
+            one = ui.select(
                 list(session.robots),
                 value=first or None,
                 label="Robot A",
                 on_change=lambda e: comparing.choose(0, e.value),
-            ).classes("wide robot-a")
-            ui.select(
+            )
+            one.classes("wide robot-a")
+            self.page.mirror(one, COMPARE_START, lambda: comparing.robots[0] or None)
+            other = ui.select(
                 ["", *session.robots],
                 value=second,
                 label="Robot B, if any",
                 on_change=lambda e: comparing.choose(1, e.value),
-            ).classes("wide robot-b")
+            )
+            other.classes("wide robot-b")
+            self.page.mirror(other, COMPARE_START, lambda: comparing.robots[1])
             ui.element("omni-drop").props(f"kind={FIT} words='Drop robot files or fits (.toml), or click'")
 
     def _logs(self) -> None:
         """Which of the logs."""
         comparing, session = self.comparing, self.session
         if len(session.logs) > 1:
-            ui.select(
+            logs = ui.select(
                 {key: log.label for key, log in session.logs.items()},
                 value=[log.key for log in comparing.logs],
                 multiple=True,
                 label="Logs",
                 on_change=lambda e: comparing.choose_logs(e.value),
-            ).classes("wide logs").props("use-chips")
+            )
+            logs.classes("wide logs").props("use-chips")
+            self.page.mirror(logs, COMPARE_START, lambda: [log.key for log in comparing.logs])
 
     def _start(self) -> None:
         comparing = self.comparing
@@ -107,13 +113,15 @@ class CompareTab:
             )
             return
         with ui.row().classes("line"):
-            ui.select(
+            fits = ui.select(
                 comparing.files,
                 value=comparing.fits,
                 multiple=True,
                 label="Fits, the oldest first",
                 on_change=lambda e: comparing.choose_fits(e.value),
-            ).classes("wide fits").props("use-chips")
+            )
+            fits.classes("wide fits").props("use-chips")
+            self.page.mirror(fits, COMPARE_START, lambda: comparing.fits)
         with ui.row().classes("line"):
             for name in comparing.files:
                 ui.link(name, f"/robot/{quote(name)}").props("download")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from nicegui import ui
 
 from omnidyn.studio.elements import table, verdict
-from omnidyn.studio.fit.state import Fitting
+from omnidyn.studio.fit.state import FITTED, HELD_OUT, LEFT_OUT, Fitting
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import FIT, FREE, LOGS, ROBOT
 from omnidyn.studio.series import SERIES
@@ -17,7 +18,7 @@ WHY = {
     "no_robot": "Choose a robot first.",
     "checking": "The log is being checked.",
     "nothing_free": "Nothing is free: choose what to fit.",
-    "all_held_out": "Every log is held out: leave one to fit.",
+    "all_held_out": "No log is fitted: choose one to fit.",
 }
 
 
@@ -31,24 +32,30 @@ class FitTab:
         """Lay it out."""
         self.page.empty("Fit")
         self.page.part(self.page.robot_choice, ROBOT)
-        self.page.part(self._choices, FREE, LOGS, ROBOT)
+        self.page.part(self._uses, LOGS, FIT)
+        self.page.part(self._free, FREE, ROBOT)
         self.page.part(self._start, FIT, LOGS)
         self.page.progress(FIT, lambda: self.fitting.last, "fit")
         self.page.part(self._result, FIT)
 
-    def _choices(self) -> None:
-        """What is held out, and what is fitted; not made again while somebody chooses."""
-        session = self.session
-        if len(session.logs) > 1:
-            names = {key: log.label for key, log in session.logs.items()}
-            ui.select(
-                names,
-                value=self.fitting.held_out,
-                multiple=True,
-                label="Hold out: predict these logs, do not fit them",
-                on_change=lambda e: self.fitting.hold_out(e.value),
-            ).classes("wide held-out").props("use-chips")
-        self._free()
+    def _uses(self) -> None:
+        """What each log is used for: fitted, predicted only, or not at all."""
+        if len(self.session.logs) < 2:
+            return
+        with ui.element("div").classes("robots"):
+            for key, log in self.session.logs.items():
+                with ui.row().classes("line entry"):
+                    ui.label(log.label).classes("use")
+                    ui.toggle(
+                        [FITTED, HELD_OUT, LEFT_OUT], value=self.fitting.use_of(key), on_change=self._use(key)
+                    ).props(f"no-caps dense unelevated aria-label='use of {log.label}'")
+                    if log.error or (log.result and log.result["has_errors"]):
+                        ui.label("not usable as it is: leave it out, or mend it on the tab Log").classes("error-text")
+        ui.label("What is held out is predicted, not fitted: that shows what the model is worth.").classes("quiet")
+
+    def _use(self, key: str) -> Callable[[Any], None]:
+        """What takes the use of a log."""
+        return lambda event: self.fitting.use(key, event.value)
 
     def _start(self) -> None:
         """The button, or why it waits."""
@@ -62,7 +69,7 @@ class FitTab:
             if code:
                 ui.label(words if code in ("unfit", "unread") else WHY[code]).classes("text quiet").props("id=why")
             elif not self.fitting.last.running:
-                names = ", ".join(log.label for log in session.logs.values())
+                names = ", ".join(log.label for log in self.fitting.logs)
                 ui.label(f"{names}, from {session.robot}").classes("text quiet")
 
     def _free(self) -> None:
@@ -71,13 +78,15 @@ class FitTab:
         choices = self.fitting.choices
         names = {key: f"{words} ({key})" for group in ("default", "others") for key, words in choices[group]}
         if names:
-            ui.select(
+            free = ui.select(
                 names,
                 value=[key for key in self.fitting.free if key in names],
                 multiple=True,
                 label="Free: what is fitted",
                 on_change=lambda e: self.fitting.set_free(e.value),
-            ).classes("wide free").props("use-chips")
+            )
+            free.classes("wide free").props("use-chips")
+            self.page.mirror(free, FIT, lambda: [key for key in self.fitting.free if key in names])
 
     def _result(self) -> None:
         fit = self.fitting.last

@@ -79,13 +79,15 @@ class TrackTab:
         """The controllers, the sensors, and the robot that is driven in truth."""
         tracks = self.tracks
         with ui.row().classes("line"):
-            ui.select(
+            controllers = ui.select(
                 tracks.controller_names,
                 value=tracks.controllers,
                 multiple=True,
                 label="Controllers side by side",
                 on_change=lambda e: tracks.control(e.value),
-            ).classes("wide controllers").props("use-chips")
+            )
+            controllers.classes("wide controllers").props("use-chips")
+            self.page.mirror(controllers, TRACK_START, lambda: tracks.controllers)
             ui.select(
                 ["", *self.session.robots],
                 value=tracks.plant if tracks.plant in self.session.robots else "",
