@@ -117,7 +117,7 @@ def test_what_is_free_is_chosen_and_a_cancelled_fit_keeps_the_best_so_far(browse
     verdict(page)
     choose_robot(page, "mecanum")
     page.click(".free")
-    page.get_by_role("option", name=re.compile("body.mass_kg")).click()
+    page.get_by_role("option", name=Key.parse("body.mass_kg").words, exact=True).click()
     page.keyboard.press("Escape")
     page.click("#fit:not([disabled])")
     page.wait_for_function("document.querySelector('#fit-progress')?.innerText.includes(', step')")

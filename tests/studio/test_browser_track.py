@@ -51,7 +51,7 @@ def test_controllers_side_by_side(browser, tmp_path):
     assert page.is_disabled("#track")
     assert page.inner_text("#why-track") == "Choose a robot first."
     choose(page, "robot", "axebot")
-    page.get_by_label("size_m").fill("0.4")
+    page.get_by_label("size [m]").fill("0.4")
     page.click("#track:not([disabled])")
     verdict(page, "#track-verdict")
     said = assert_tracked(page, "axebot", "--path", "eight:size_m=0.4", "--controller", "pid", "--controller", "mpc")

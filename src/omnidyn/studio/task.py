@@ -46,7 +46,7 @@ class Task:
 
     async def run(self, session: Session, part: str, worker: str, job: str, request: dict[str, Any]) -> None:
         """Do a job in a worker. part: of the page that shows it. request: without the "folder" of the results."""
-        self.running, self.progress, self.folder = True, "...", session.new_folder() / job
+        self.running, self.progress, self.folder = True, "starting", session.new_folder() / job
         session.changed(part)
 
         def listen(kind: str, value: Any) -> None:

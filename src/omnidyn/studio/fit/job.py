@@ -69,7 +69,7 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     omnidyn.save_robot(estimate.robot, folder / "robot.toml")
     _ = result.after  # what follows a fit is made here, where its progress is heard
     listen(Report("drawing"))
-    table = _numbers(estimate)
+    table = _with_before(_numbers(estimate), robot)
     warnings = [{"severity": w.severity, "text": str(w)} for w in dict.fromkeys(estimate.warnings)]
     (folder / "numbers.csv").write_text(_csv(table), "utf-8")
     (folder / "warnings.csv").write_text(
@@ -114,6 +114,21 @@ def _numbers(estimate: Estimate) -> Table:
         for name, value in estimate.value.items()
     ]
     return Table(("number", "key", "value", "std error", "95 % interval", "unit", ""), rows)
+
+
+def _with_before(table: Table, robot: Robot | None) -> Table:
+    """The table, and beside each number what the robot had before the fit."""
+    before = [_number_of(row[1], robot) for row in table.rows]
+    rows = [(*row[:5], old, *row[5:]) for row, old in zip(table.rows, before, strict=True)]
+    return replace(table, head=(*table.head[:5], "before", *table.head[5:]), rows=rows)
+
+
+def _number_of(name: str, robot: Robot | None) -> str:
+    """A number of a robot, "" for none."""
+    try:
+        return f"{Key.parse(name).get(robot):.5g}" if robot is not None and find_key(name) else ""
+    except (OmnidynError, TypeError, ValueError):
+        return ""
 
 
 def _csv(table: Table) -> str:

@@ -76,7 +76,7 @@ class FitTab:
         """What is fitted; at first what `identify` fits of itself."""
         self.fitting.want_choices()
         choices = self.fitting.choices
-        names = {key: f"{words} ({key})" for group in ("default", "others") for key, words in choices[group]}
+        names = dict([*choices["default"], *choices["others"]])
         if names:
             free = ui.select(
                 names,

@@ -16,6 +16,7 @@ from omnidyn.studio.series import SERIES
 from omnidyn.studio.track.job import DRAWN
 from omnidyn.studio.track.state import Tracks
 
+UNITS = {"_rad_s": "rad/s", "_rad": "rad", "_m": "m", "_s": "s"}  # of the names of sizes
 WHY = {
     "no_robot": "Choose a robot first.",
     "no_controller": "Choose a controller first.",
@@ -54,7 +55,7 @@ class TrackTab:
             for name, value in OPTIONS.get(tracks.path, {}).items():
                 given = tracks.options[tracks.path]
                 ui.input(
-                    name,
+                    _label(name),
                     value=given.get(name, ""),
                     placeholder="" if value is None else f"{value}",
                     on_change=_into(given, name),
@@ -95,11 +96,11 @@ class TrackTab:
                 on_change=lambda e: setattr(tracks, "plant", e.value),
             ).classes("wide plant")
             ui.input(
-                "Sensors, such as encoder:2048,filter:30ms",
+                "Sensors",
                 value=tracks.sensors,
-                placeholder="as the robot file says",
+                placeholder="such as encoder:2048,filter:30ms",
                 on_change=lambda e: setattr(tracks, "sensors", e.value or ""),
-            ).classes("wide").props("stack-label")
+            ).classes("wide").props("stack-label hint='empty: as the robot file says'")
 
     def _start(self) -> None:
         code = self.tracks.why_not()
@@ -126,6 +127,12 @@ class TrackTab:
                 ui.link("Drawn path (CSV)", f"/track/{DRAWN}").props("download")
         self.page.plot(task.series[SERIES], [], "track-signals.png")
         self.page.calls(task.command, task.python, "call-track")
+
+
+def _label(name: str) -> str:
+    """The name of a size as a page has it: words, and the unit."""
+    end = next((end for end in UNITS if name.endswith(end)), "")
+    return f"{name.removesuffix(end)} [{UNITS[end]}]" if end else name
 
 
 def _into(given: dict[str, str], name: str) -> Callable[[Any], None]:
