@@ -4,6 +4,9 @@
     python -m benchmarks simulate   # one of them; --json for machines
     python -m benchmarks all
 
+In folders by subject: simulation, batch; logs; identification, blind, ten_robots, twins, wrong_worlds; real; control,
+control_real; export; skins. house counts the source, answers compares two states of it, results are published tables.
+
 A ratio counts only inside one run: same inputs, same machine, same minute. Every time stands beside an error.
 """
 

@@ -6,27 +6,39 @@ import argparse
 import importlib
 import json
 import sys
+from pathlib import Path
 
 from benchmarks.publish import publish
 
+SUBJECTS = ("simulation", "logs", "identification", "real", "control", "export", "skins")  # folders of several
 NAMES = {
+    # the root, and folders of one benchmark
     "house": "the house in figures: lines, files per folder, parameter lists, what stands twice, circles",
-    "path_of_a_value": "functions and rooms that hold a voltage on its way from `simulate` to the Run",
+    "batch": "many robots at once beside a C++ loop, NumPy, JAX, MuJoCo; poses, implicit blocks, a million (5 minutes)",
+    "control_real": "closed loops on an independent plant with real sensors, beside hand PID and LQR (a minute)",
+    "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",
+    "twins": "six twins of real robots and the logs that no fit saw: each line against its bound (20 minutes)",
+    "blind": "what a log cannot tell: 20 rank-deficient set-ups, 20 full-rank ones, 20 with equal causes (two minutes)",
+    "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",
+    # simulation
     "accuracy": "exact engine against 50 digits: Table 3 and 50 random robots, 10,000 steps each (about a minute)",
     "simulate": "one robot, 10 s at 1 kHz: time and error beside scipy's LSODA with tanh friction",
     "inductance": "what winding inductance costs: exact engine with L > 0 beside L = 0, 10 s at 1 kHz",
-    "batch": "many robots at once beside a C++ loop, NumPy, JAX, MuJoCo; poses, implicit blocks, a million (5 minutes)",
     "rest": "60 s inside the dead zone: the robot must not move at all",
+    "plant": "implicit engine: cost of a step, iterations of the solver, error against cost beside scipy and MuJoCo",
+    "environments": "65,536 environments: steps a second, checkers, a million steps beside plain Python (3 minutes)",
+    "campaigns": "shards beside the batch kernel, a million closed loops, overhead of a shard on Dask (five minutes)",
+    # logs
     "compare": "compare on simulated logs: rmse, false alarms of the test of white errors, which robot is better",
     "check": "12 faults in 200 simulated logs each, 1000 clean logs: what `omnidyn check` finds and says (10 minutes)",
-    "steady": "steady-state identification: real logs beside their README; coverage on simulated ones (3 minutes)",
-    "floors": "changes of friction inside a run: how many are named, of one floor too, beside two halves (a minute)",
-    "plant": "implicit engine: cost of a step, iterations of the solver, error against cost beside scipy and MuJoCo",
     "big_log": "a log of 1 GB in pieces, CSV and Parquet: processor time and memory (writes it to a temporary folder)",
-    "large": "identify on three logs of 40 s at 200 Hz, four wheels, 12 channels: time, memory (ten minutes)",
     "big_bag": "an MCAP of 2 GB: processor time and memory beside rosbags and mcap (writes it to a temporary folder)",
     "fuzz_readers": "every reader on mutated and random bytes, 60 s each: only errors of omnidyn may leave it",
-    "real_fit": "output error on real logs: the motor bench and udea, fitted on some runs, run on others",
+    "stagger": "topics with clocks of their own: check, geometry and fits beside equal stamps (two minutes)",
+    # identification
+    "steady": "steady-state identification: real logs beside their README; coverage on simulated ones (3 minutes)",
+    "floors": "changes of friction inside a run: how many are named, of one floor too, beside two halves (a minute)",
+    "large": "identify on three logs of 40 s at 200 Hz, four wheels, 12 channels: time, memory (ten minutes)",
     "laws_identified": "Stribeck, Dahl, LuGre fitted back from logs of other integrators: coverage, std (an hour)",
     "laws_ladder": "Stribeck, LuGre, slip under a plain file: found, named, taken by the ladder, held (40 minutes)",
     "groups": "two floors in one likelihood: coverage of their differences, bootstrap over runs (two minutes)",
@@ -34,34 +46,32 @@ NAMES = {
     "identify": "output error on simulated logs: coverage, starts, nuisances, time beside peers (ten minutes)",
     "identify_ellipse": "the same by the implicit engine: an ellipse of friction in a turning frame (four minutes)",
     "identify_loop": "output error through a firmware's speed loop, simulated logs: coverage (a few minutes)",
+    "coloured": "output error where errors have a memory: coverage, std beside the Cramer-Rao bound (an hour)",
+    "forces": "a right robot under random forces of the floor: what is found, what intervals hold (ten minutes)",
+    "ladder": "identify with its ladder, on wrong and right worlds: what it takes, what then holds (40 minutes)",
+    "group_shapes": "a shape of friction per group, a level of each wheel: taken where it is so only (half an hour)",
+    "selection": "the rule of selection beside those before it: useless numbers taken, effects found (a minute)",
+    "plans": "a planned minute of driving beside others, inside its room, and as sure as predicted (minutes)",
+    "studies": "intervals and false alarms over many draws: breakaway, laws, rounding, noise, motors (15 minutes)",
+    "ordinary": "robots as people have them: one evaluation, a run, whole fits, beside goals (ten minutes)",
+    # real
+    "real_fit": "output error on real logs: the motor bench and udea, fitted on some runs, run on others",
+    # control
     "control": "tracking on the eight references of the peers, seven conditions, every controller (three minutes)",
     "control_plants": "tracking of richer robots: identified numbers beside those of a data sheet (two minutes)",
-    "control_real": "closed loops on an independent plant with real sensors, beside hand PID and LQR (a minute)",
     "control_mismatch": "the same with wrong friction, payload, slip, jumps, missing samples, latency (a minute)",
     "control_chain": "log, identify, track on these plants: a guessed robot beside the fitted one (two minutes)",
     "control_casadi": "the predictive controller beside CasADi with IPOPT on these plants (a minute)",
     "tune": "what tune finds, on an independent plant: errors before and after, three robots and sensors (15 minutes)",
-    "coloured": "output error where errors have a memory: coverage, std beside the Cramer-Rao bound (an hour)",
-    "forces": "a right robot under random forces of the floor: what is found, what intervals hold (ten minutes)",
-    "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",
-    "twins": "six twins of real robots and the logs that no fit saw: each line against its bound (20 minutes)",
-    "first_minutes": "CSV to report of a robot of `init`, whole commands: nothing compiled, and compiled (3 minutes)",
-    "ladder": "identify with its ladder, on wrong and right worlds: what it takes, what then holds (40 minutes)",
     "mpc": "the predictive controller: a step beside others' in the same run, cold starts, tracking, C (8 minutes)",
-    "group_shapes": "a shape of friction per group, a level of each wheel: taken where it is so only (half an hour)",
-    "blind": "what a log cannot tell: 20 rank-deficient set-ups, 20 full-rank ones, 20 with equal causes (two minutes)",
-    "environments": "65,536 environments: steps a second, checkers, a million steps beside plain Python (3 minutes)",
+    # export
     "exports": "the paper's robot in C, FMU, MuJoCo, python-control, WPILib: errors, drift at rest (a minute)",
     "exported_c": "exported C on a million random calls under sanitizers: findings, the slowest call (four minutes)",
     "exported_robots": "20 robots of init and three presets in C and FMU: differences, sizes, stack (four minutes)",
-    "selection": "the rule of selection beside those before it: useless numbers taken, effects found (a minute)",
+    # skins
+    "first_minutes": "CSV to report of a robot of `init`, whole commands: nothing compiled, and compiled (3 minutes)",
     "studio": "a drive of ten minutes in a browser, a silent client, many pages, an installation (13 minutes)",
-    "stagger": "topics with clocks of their own: check, geometry and fits beside equal stamps (two minutes)",
-    "studies": "intervals and false alarms over many draws: breakaway, laws, rounding, noise, motors (15 minutes)",
-    "campaigns": "shards beside the batch kernel, a million closed loops, overhead of a shard on Dask (five minutes)",
     "studio_log": "a log of 3.6 million rows in the studio, in a browser: first word, picture, pans (2 minutes)",
-    "ordinary": "robots as people have them: one evaluation, a run, whole fits, beside goals (ten minutes)",
-    "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",
 }
 ANSWERS = "answers"
 OF_ANSWERS = "no benchmark: 360 commands and calls, recorded, and compared with a recording to the last digit"
@@ -79,6 +89,12 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
+def module_of(name: str) -> str:
+    """Where a benchmark stands: a file in the folder of its subject, or a folder or file in the root."""
+    folders = [subject for subject in SUBJECTS if Path(__file__).with_name(subject).joinpath(f"{name}.py").is_file()]
+    return ".".join(("benchmarks", *folders, name))
+
+
 def main() -> int:
     if sys.argv[1:2] == [ANSWERS]:
         return importlib.import_module("benchmarks.answers").main(sys.argv[2:])
@@ -89,7 +105,7 @@ def main() -> int:
     names = list(NAMES) if "all" in asked.names else list(dict.fromkeys(asked.names))
     done = []
     for name in names:
-        table = importlib.import_module(f"benchmarks.{name}").measure()
+        table = importlib.import_module(module_of(name)).measure()
         done.append(table)
         if asked.publish:
             publish(name, table)

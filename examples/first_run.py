@@ -8,6 +8,6 @@ print(repr(run))  # print(run) is a table
 print(f"forward at {run.twist[-1, 0]:.4f} m/s after {run.t[-1]:.1f} s, {run.pose[-1, 0]:.4f} m away")
 stuck = omnidyn.simulate(robot, [[0.0, 0.6, -0.6]] * 1500, 1e-3)
 print("under 0.6 V it stays at", stuck.pose[-1].tolist())
-for axis, pattern in zip(("x", "y", "yaw"), omnidyn.axis_patterns(robot), strict=True):
-    print(f"{axis} starts to move at {omnidyn.breakaway_voltage(robot, pattern):.3f} V")
+for row in omnidyn.dead_zone(robot).rows:
+    print(f"{row.axis} starts to move at {row.scale:.3f} V")
 omnidyn.write_run(run, "run.csv")

@@ -8,6 +8,7 @@ import pytest
 import omnidyn
 from omnidyn.arguments import check_order
 from omnidyn.errors import InputError
+from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moving_axes
 from omnidyn.run import Run
 
 ROBOT = omnidyn.load_robot("axebot")
@@ -34,8 +35,8 @@ TABLE = omnidyn.read_steady_table(Path(__file__).resolve().parents[1] / "example
         (lambda: omnidyn.check(ROBOT, RUN), "a Robot before a Run", r"check\(log\)"),
         (lambda: omnidyn.write_run("run.csv", RUN), "the text 'run.csv' before a Run", r"write_run\(run, path\)"),
         (lambda: omnidyn.save_robot("robot.toml", ROBOT), "the text 'robot.toml' before a Robot", "save_robot"),
-        (lambda: omnidyn.breakaway_voltage(VOLTS, ROBOT), "a ndarray before a Robot", "breakaway_voltage"),
-        (lambda: omnidyn.moving_axes(VOLTS, ROBOT), "a ndarray before a Robot", r"moving_axes\(robot, voltage\)"),
+        (lambda: breakaway_voltage(VOLTS, ROBOT), "a ndarray before a Robot", "breakaway_voltage"),
+        (lambda: moving_axes(VOLTS, ROBOT), "a ndarray before a Robot", r"moving_axes\(robot, voltage\)"),
     ],
 )
 def test_a_swapped_pair_is_recognised(call, got, expected):
@@ -49,7 +50,7 @@ def test_a_swapped_pair_is_recognised(call, got, expected):
         (lambda: omnidyn.compare("axebot", RUN), "no Robot; got the text 'axebot'; expected compare.*load_robot"),
         (lambda: omnidyn.identify("log.csv", ROBOT), "no Run or Log or .*; got the text 'log.csv'.*read_log"),
         (lambda: omnidyn.identify([RUN, ROBOT], ROBOT), "no Run or Log or .*; got a list of Run and Robot"),
-        (lambda: omnidyn.check(None), "no Log or Run; got nothing.*load_log"),
+        (lambda: omnidyn.check(None), "no Log or Run; got nothing.*recorded=True"),
         (
             lambda: omnidyn.read_log(RUN),
             r"no str or PathLike; got a Run; expected read_log.*ready to use",
@@ -72,11 +73,11 @@ def test_right_ones_pass_and_what_an_iterator_holds_is_not_asked():
     "call",
     [
         omnidyn.dead_zone,
-        omnidyn.axis_patterns,
+        axis_patterns,
         omnidyn.state_space,
-        lambda name: omnidyn.dead_zone_map(name, [0.0]),
-        lambda name: omnidyn.breakaway_voltage(name, VOLTS),
-        lambda name: omnidyn.moving_axes(name, VOLTS),
+        lambda name: dead_zone_map(name, [0.0]),
+        lambda name: breakaway_voltage(name, VOLTS),
+        lambda name: moving_axes(name, VOLTS),
         lambda name: omnidyn.confidence_band(name, VOLTS, 0.1),
         lambda name: omnidyn.acceleration(name, np.zeros(3), np.zeros(3)),
         lambda name: omnidyn.identify(TABLE, name),

@@ -17,7 +17,6 @@ from benchmarks.answers import differences
 ROOT = Path(__file__).resolve().parents[1]
 QUICK = (
     "house",
-    "path_of_a_value",
     "accuracy",
     "simulate",
     "inductance",

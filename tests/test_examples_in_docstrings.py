@@ -7,7 +7,20 @@ import pytest
 
 import omnidyn
 
-WITH_EXAMPLES = ("align", "check", "drift", "identify", "sample", "simulate")
+WITH_EXAMPLES = (
+    "align",
+    "check",
+    "compare",
+    "confidence_band",
+    "dead_zone",
+    "drift",
+    "identify",
+    "read_log",
+    "sample",
+    "simulate",
+    "track",
+    "tune",
+)
 
 
 @pytest.mark.parametrize("name", WITH_EXAMPLES)

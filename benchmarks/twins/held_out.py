@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import trim_mean
 
-from benchmarks import real_nuisances, udea
+from benchmarks.real import real_nuisances, udea
 from benchmarks.table import Table
 from benchmarks.twins.answers import BY_DEFAULT, MOTOR_METHODS, WINDOWS, Answer, ask, driver_map, examined, motor_method
 from benchmarks.twins.motor import HOLD, MEAN, TRIM, Drive, plain_fit

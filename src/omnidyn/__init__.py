@@ -38,27 +38,22 @@ _HOME = {
     "Run": "omnidyn.run",
     "SteadyState": "omnidyn.identification.methods",
     "Tracking": "omnidyn.control.tracking",
-    "Trackings": "omnidyn.control.tracking",
     "Tuned": "omnidyn.control.tune",
     "acceleration": "omnidyn.model.dynamics",
     "align": "omnidyn.comparison.align",
-    "axis_patterns": "omnidyn.model.deadzone",
-    "breakaway_voltage": "omnidyn.model.deadzone",
     "check": "omnidyn.findings.check",
     "compare": "omnidyn.comparison.compare",
     "confidence_band": "omnidyn.simulation.band",
     "dead_zone": "omnidyn.model.known.dead_zone",
-    "dead_zone_map": "omnidyn.model.deadzone",
     "drift": "omnidyn.comparison.drift",
     "feedforward_table": "omnidyn.control.table",
     "identify": "omnidyn.identification.identify",
     "load_campaign": "omnidyn.campaigns.results",
     "load_controller": "omnidyn.control.controllers",
-    "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
-    "moving_axes": "omnidyn.model.deadzone",
     "path": "omnidyn.control.paths.path",
     "path_demand": "omnidyn.control.demand",
+    "plan": "omnidyn.identification.planning.plan",
     "preset_names": "omnidyn.model.robot_file",
     "read_commands": "omnidyn.logs.command_file",
     "read_log": "omnidyn.logs.read_log",
@@ -91,7 +86,7 @@ if TYPE_CHECKING:
     from omnidyn.control.feedforward import voltage_for
     from omnidyn.control.paths.path import path
     from omnidyn.control.table import feedforward_table
-    from omnidyn.control.tracking import Tracking, Trackings
+    from omnidyn.control.tracking import Tracking
     from omnidyn.control.tune import Tuned, tune
     from omnidyn.errors import OmnidynError
     from omnidyn.findings.check import check
@@ -99,11 +94,11 @@ if TYPE_CHECKING:
     from omnidyn.identification.identification import Identification
     from omnidyn.identification.identify import identify
     from omnidyn.identification.methods import MotorFit, MotorLine, OutputError, SteadyState
+    from omnidyn.identification.planning.plan import plan
     from omnidyn.logs.command_file import read_commands
-    from omnidyn.logs.read_log import load_log, read_log
+    from omnidyn.logs.read_log import read_log
     from omnidyn.logs.run_file import write_run
     from omnidyn.logs.steady_table import read_steady_table
-    from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moving_axes
     from omnidyn.model.dynamics import acceleration, state_space
     from omnidyn.model.known.dead_zone import dead_zone
     from omnidyn.model.robot import Robot

@@ -7,19 +7,22 @@ import os
 from collections.abc import Iterable, Iterator
 from numbers import Integral, Real
 
+import numpy as np
+
 from omnidyn.errors import InputError
 
 # What to call instead, by the name of the type that is wanted.
 MADE_BY = {
     "Robot": 'omnidyn.load_robot("axebot"), or of a file, makes one',
     "Run": "omnidyn.read_log(path) makes one",
-    "Log": "omnidyn.load_log(path) makes one",
+    "Log": "omnidyn.read_log(path, recorded=True) makes one",
     "PathLike": "what stands in a file is read by its path; a Run is ready to use",
     "SteadyTable": "omnidyn.read_steady_table(path) makes one",
     "OutputErrorEstimate": "omnidyn.identify(logs, robot) makes one",
 }
 
 Kinds = type | tuple[type, ...]
+Rng = int | np.random.Generator | np.random.SeedSequence | None  # as `numpy.random.default_rng` takes it
 
 
 _FRAMES = ("pandas", "polars", "xarray")
@@ -39,6 +42,23 @@ def is_whole(value: object) -> bool:
 def is_number(value: object) -> bool:
     """Whether a value is one real number, of Python or of NumPy; True and False are none."""
     return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def seed_of(rng: Rng) -> int:
+    """A seed: the whole number given, or one drawn from a generator, a seed sequence, or, for None, at random.
+
+    Raises InputError for anything else.
+    """
+    if is_whole(rng) and rng >= 0:  # pyright: ignore[reportOperatorIssue]
+        return int(rng)  # pyright: ignore[reportArgumentType]
+    if rng is None or isinstance(rng, np.random.Generator | np.random.SeedSequence):
+        return int(np.random.default_rng(rng).integers(2**32))
+    raise InputError(
+        "no source of random numbers",
+        got=rng,
+        expected="a whole number, 0 or more, or a numpy.random.Generator",
+        where="rng",
+    )
 
 
 def check_order(call: str, *places: tuple[object, Kinds]) -> None:

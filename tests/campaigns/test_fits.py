@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from omnidyn.campaigns.results import load_campaign
 from omnidyn.campaigns.spec import parse_spec
 from omnidyn.campaigns.sweep import sweep
 from omnidyn.cli import main
@@ -106,6 +107,29 @@ def test_a_row_for_each_log_is_what_identify_says(folder, identified):
     assert len(rows) == 1 + len(frame)
     assert rows[0][1:3] == ["log", "identify.loss"]
     assert main(["sweep", "merge", "out", "-o", "fits.csv"]) == 3
+
+
+def test_a_log_that_ends_too_early_is_not_ok_and_what_is_known_is_counted(folder, capsys):
+    whole = (folder / "gray" / "day0.csv").read_text().rstrip()
+    (folder / "gray" / "day0.csv").write_text(whole[: whole.rindex(",")])
+    (folder / "fits.toml").write_text(
+        'schema = 1\nrobot = "plain.toml"\n[identify]\nquick = true\n'
+        'logs = ["gray", "blue/day0.csv", "blue/day0a.csv"]\n'
+    )
+    assert main(["sweep", "fits.toml", "-o", "out", "--workers", "1"]) == 4
+    said = capsys.readouterr()
+    assert "2 of 4 fits do not stand" in said.err
+    frame = load_campaign("out").to_dataframe().set_index("log")
+    cut = frame.loc["gray/day0.csv"]
+    assert (cut.ok, cut.verdict) == (False, "fit_of_part")
+    assert "ends in the middle of a row" in cut.words
+    assert cut["fit.friction.axes.coulomb[0]"] == pytest.approx(
+        frame.loc["gray/day1.csv"]["fit.friction.axes.coulomb[0]"], rel=0.1
+    )
+    assert frame.ok.tolist() == [False, True, True, False]
+    assert frame.known_share.tolist()[:3] == [1.0, 1.0, 1.0]
+    assert np.isnan(frame.known_share.iloc[3])
+    assert main(["sweep", "merge", "out"]) == 0
 
 
 def test_shapes_of_friction_are_compared_log_by_log(folder, identified):

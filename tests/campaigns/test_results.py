@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from omnidyn.campaigns.design import points
 from omnidyn.campaigns.results import load_campaign, variance_share, wilson
 from omnidyn.campaigns.spec import Spec
 from omnidyn.campaigns.sweep import sweep
 from omnidyn.campaigns.tasks import LoadedSpec
+from omnidyn.campaigns.total_shares import total_shares
 from omnidyn.errors import InputError
 from omnidyn.report.figures.campaign import draw_campaign
 from tests.support.campaign_tasks import product
@@ -38,6 +40,43 @@ def test_shares_of_ishigami_lie_in_their_intervals(sampling, width):
             assert abs(share - truth) < width
     assert hits >= 105  # 114 of 120 are wanted; 1 in 1000 has fewer than 106 at 95 %
     assert np.mean(widths) < width
+
+
+TOTAL = {"x1": 0.5576, "x2": 0.4424, "x3": 0.2437}  # of the same
+
+
+@pytest.mark.parametrize("sampling", ["random", "latin", "sobol"])
+def test_total_shares_of_ishigami_lie_in_their_intervals(sampling):
+    vary = {name: {"range": [-math.pi, math.pi]} for name in ("task.x1", "task.x2", "task.x3")}
+    hits = 0
+    for seed in range(10):
+        spec = Spec(robot="axebot", samples=1024, sampling=sampling, seed=seed, vary=vary)
+        u = points(spec, 0, 1024)
+        y = ishigami(-math.pi + 2.0 * math.pi * u)
+        for (share, low, high), truth in zip(total_shares(u, y, (0, 0, 0)), TOTAL.values(), strict=True):
+            hits += low <= truth <= high
+            assert abs(share - truth) < 0.01
+    assert hits >= 26  # 28.5 of 30 are wanted
+
+
+def test_a_total_share_leaves_noise_out_and_knows_words():
+    """y = u w + 0.2 e, w 0 or 1: V = 1/6 - 1/16 + 0.04; E Var(y|w) = 1/24, E Var(y|u) = 1/12."""
+    random = np.random.default_rng(2)
+    places = np.column_stack([random.uniform(size=(4000, 2)), random.integers(0, 2, 4000)])
+    y = places[:, 0] * places[:, 2] + 0.2 * random.standard_normal(4000)
+    whole = 1 / 6 - 1 / 16 + 0.04
+    shares = total_shares(places, y, (0, 0, 2))
+    for (share, low, high), truth in zip(shares, (1 / 24 / whole, 0.0, 1 / 12 / whole), strict=True):
+        assert abs(share - truth) < 0.03
+        assert low <= truth <= high
+        assert high >= truth + 0.04 / whole - 0.1  # what no polynomial explains may be of any variable
+
+
+def test_total_shares_of_a_grid_are_exact():
+    """y = a b over levels a of 0, 1 and b of 1, 2: V = 11/16, E Var(y|b) = 10/16, E Var(y|a) = 2/16."""
+    a, b = np.repeat([0.0, 1.0], 2), np.tile([1.0, 2.0], 2)
+    shares = total_shares(np.column_stack([a, b - 1.0]), a * b, (2, 2), True)
+    assert [share for share, *_ in shares] == pytest.approx([10 / 11, 2 / 11])
 
 
 def test_shares_of_a_grid_are_those_of_its_levels(tmp_path):

@@ -48,6 +48,8 @@ def problem(tmp_path, **changes):
         ({"vary": {"friction": {"std": 0.1}}}, "not one number of the robot file"),
         ({"sampling": "grid", "samples": None}, "needs values, or a range or factor with steps"),
         ({"vary": {"body.mass_kg": {"values": [1.0, math.inf]}}}, "cannot use this value"),
+        ({"correlation": {"keys": ["friction"], "matrix": [[1.0]]}}, "of what does not vary; got friction"),
+        ({"correlation": {"keys": ["body.mass_kg"], "matrix": [[2.0]]}}, "less than or equal to 1"),
         ({"schema": 2}, "unknown schema; got 2"),
     ],
 )
@@ -95,6 +97,29 @@ def test_a_grid_counts_every_combination(tmp_path):
     assert columns["body.mass_kg"].tolist() == [1.0, 1.0, 1.5, 1.5, 2.0, 2.0]
     assert columns["controller"] == ["pid", "feedforward"] * 3
     assert made.columns(2, 4)["body.mass_kg"].tolist() == [1.5, 1.5]
+
+
+@pytest.mark.parametrize("sampling", ["random", "latin", "sobol"])
+def test_correlated_numbers_have_their_law_and_their_correlation(tmp_path, sampling):
+    vary = {
+        "body.mass_kg": {"std": 0.1},
+        "body.inertia_kg_m2": {"std": 0.002},
+        "friction": {"factor": [0.5, 1.5]},
+        "wheels.wheel_radius_m": {"factor": [0.98, 1.02]},
+    }
+    matrix = [[1.0, 0.8, -0.3], [0.8, 1.0, 0.0], [-0.3, 0.0, 1.0]]
+    keys = ["body.mass_kg", "body.inertia_kg_m2", "friction"]
+    changes = {"samples": 2**14, "sampling": sampling, "vary": vary}
+    made = problem(tmp_path, **changes, correlation={"keys": keys, "matrix": matrix})
+    columns = made.columns(0, 2**14)
+    normals = np.array([columns[keys[0]], columns[keys[1]], norm.ppf(columns["friction"] - 0.5)])
+    np.testing.assert_allclose(np.corrcoef(normals), matrix, atol=0.03)
+    assert columns[keys[0]].std() == pytest.approx(0.1, rel=0.02)
+    assert kstest(columns["friction"], "uniform", (0.5, 1.0)).pvalue > 0.01
+    free = problem(tmp_path, **changes).columns(0, 2**14)["wheels.wheel_radius_m"]
+    np.testing.assert_array_equal(columns["wheels.wheel_radius_m"], free)
+    for name, whole in columns.items():
+        np.testing.assert_array_equal(made.columns(700, 777)[name], whole[700:777])
 
 
 def test_numbers_follow_their_law():

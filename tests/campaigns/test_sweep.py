@@ -1,20 +1,23 @@
 """Campaigns: the same bytes however they are cut, killed and resumed; nothing lost, nothing computed twice."""
 
 import errno
+import logging
 import os
 import random
 import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from omnidyn import files
+from omnidyn.campaigns.executors import _quiet
 from omnidyn.campaigns.sweep import sweep
-from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.files import sha256
 from tests.support import campaign_tasks
 from tests.support.campaign_tasks import MARKS, mass, product, raising
@@ -112,6 +115,37 @@ def test_a_task_that_raises_or_ends_its_process_is_marked_and_the_others_go_on(t
     assert campaign.verdict.code == "campaign_failed"
 
 
+class Ended(ThreadPoolExecutor):
+    """An executor whose machines are gone after the first call, as those of a Dask scheduler that ended."""
+
+    calls = 0
+
+    def submit(self, *arguments):
+        self.calls += 1
+        if self.calls > 1:
+            future = Future()
+            future.cancel()
+            future.set_running_or_notify_cancel()
+            return future
+        return super().submit(*arguments)
+
+
+def test_a_dead_scheduler_is_one_sentence_and_what_is_done_stays(tmp_path, threads):
+    with Ended(1) as pool, pytest.raises(OmnidynError, match="the executor has ended; got CancelledError; start it"):
+        sweep(SPEC, tmp_path / "x", task=product, executor=pool)
+    assert sweep(None, tmp_path / "x", task=product, executor=threads).status.complete
+
+
+def test_the_library_of_a_cluster_is_quiet_within_it(caplog):
+    log = logging.getLogger("distributed.client")
+    log.setLevel(logging.WARNING)
+    with _quiet("distributed"):
+        log.error("a traceback of forty lines")
+    assert not caplog.records
+    log.error("heard again")
+    assert len(caplog.records) == 1
+
+
 def test_a_full_disk_is_said_and_resumed_from(tmp_path, threads, monkeypatch, undisturbed):
     fsync, calls = os.fsync, []
 
@@ -151,9 +185,9 @@ def test_a_second_run_is_refused_and_another_share_is_not(tmp_path, threads):
 
 def test_another_campaign_in_the_folder_is_refused_with_what_differs(tmp_path, threads, write):
     sweep(SPEC, tmp_path / "g", task=product, executor=threads)
-    other = SPEC | {"samples": 300, "vary": AB | {"task.a": {"range": [0.0, 1.5]}}}
+    other = SPEC | {"samples": 100, "vary": AB | {"task.a": {"range": [0.0, 1.5]}}}
     with pytest.raises(
-        InputError, match=r"samples: 200 -> 300.*vary\.task\.a\.range: \[0\.0, 1\.0\] -> \[0\.0, 1\.5\]"
+        InputError, match=r"samples: 200 -> 100.*vary\.task\.a\.range: \[0\.0, 1\.0\] -> \[0\.0, 1\.5\]"
     ):
         sweep(other, tmp_path / "g", task=product, executor=threads)
     with pytest.raises(InputError, match=r"task: .*product.* -> .*mass"):
@@ -178,6 +212,50 @@ TRACK = {
     "vary": {"wheels.wheel_radius_m": {"factor": [0.98, 1.02]}, "friction": {"factor": [0.5, 1.5]}},
     "track": {"path": "circle", "controller": "pid", "duration_s": 0.5, "noise_m_s": 0.005},
 }
+
+
+@pytest.mark.parametrize("sampling", ["sobol", "random"])
+def test_more_samples_go_on_and_give_the_bytes_of_a_fresh_run(tmp_path, threads, monkeypatch, sampling):
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    monkeypatch.setenv(MARKS, str(marks))
+    few, many = (SPEC | {"samples": n, "sampling": sampling} for n in (48, 96))
+    grown = sweep(few, tmp_path / "grown", task=product, executor=threads)
+    grown.folder.merge()
+    for _ in range(2):  # the second finds all of it
+        grown = sweep(many, tmp_path / "grown", task=product, executor=threads)
+    begun = [int(mark.name.partition("-")[0]) for mark in marks.iterdir()]
+    assert sorted(begun) == sorted([*range(96), 45, 46, 47])  # the shard that was not full, again
+    fresh = sweep(many | {"shard_rows": 7}, tmp_path / "fresh", task=product, executor=threads)
+    assert merged(grown) == merged(fresh)
+    assert grown.status.samples == 96
+    with pytest.raises(InputError, match="samples: 96 -> 48"):
+        sweep(few, tmp_path / "grown", task=product, executor=threads)
+
+
+def test_loops_that_move_together_grow_to_the_same_bytes(tmp_path, threads):
+    for samples in (24, 40):
+        grown = sweep(TRACK | {"samples": samples}, tmp_path / "grown", executor=threads)
+    assert merged(grown) == merged(sweep(TRACK | {"samples": 40}, tmp_path / "fresh", executor=threads))
+
+
+def test_a_latin_hypercube_and_a_folder_in_work_do_not_grow(tmp_path, threads):
+    latin = SPEC | {"samples": 48, "sampling": "latin"}
+    sweep(latin, tmp_path / "latin", task=product, executor=threads)
+    with pytest.raises(InputError, match="samples: 48 -> 96"):
+        sweep(latin | {"samples": 96}, tmp_path / "latin", task=product, executor=threads)
+    campaign = sweep(SPEC, tmp_path / "busy", task=product, executor=threads)
+    with campaign.folder.locked(0, 1), pytest.raises(InputError, match="another run works"):
+        sweep(SPEC | {"samples": 300}, tmp_path / "busy", task=product, executor=threads)
+
+
+def test_the_time_left_leaves_out_what_each_worker_does_once(tmp_path, threads, monkeypatch):
+    clock = iter(2.0 * k for k in range(100))  # read from the time on when both have ended their first shard
+    monkeypatch.setattr("omnidyn.campaigns.sweep.time", SimpleNamespace(monotonic=lambda: next(clock)))
+    heard = []
+    sweep(SPEC | {"samples": 30}, tmp_path / "t", task=product, executor=threads, progress=heard.append)
+    words = [report.phase for report in heard if report.phase.startswith("shard ")]
+    assert words[:3] == ["shard 1 of 6", "shard 2 of 6", "shard 3 of 6, about 6 s left"]
 
 
 @pytest.mark.long

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.control.controllers import controller_named
+from benchmarks.control.araujo import Araujo
 from omnidyn.control.paths.path import path
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.drive import Drive
@@ -20,14 +20,14 @@ def frictionless(robot):
 
 
 def test_it_follows_a_path_some_millimetres_off():
-    found = omnidyn.track(ROBOT, "zigzag", "araujo", duration=3.0)
+    found = omnidyn.track(ROBOT, "zigzag", Araujo(ROBOT), duration=3.0)
     assert found.statuses == {}
     assert 2e-3 < found.rmse_position < 12e-3  # the peers' own, by cvxpy, was 6 mm off
 
 
 def test_its_prediction_is_the_simulated_robot():
     """Held volts from a steady motion: the twist predicted is that of the engine."""
-    control, plain = controller_named("araujo", ROBOT), frictionless(ROBOT)
+    control, plain = Araujo(ROBOT), frictionless(ROBOT)
     moves = np.array([[0.5, -1.0, 0.3], [0.2, 0.1, -0.4], [-0.3, 0.2, 0.1]])
     volts = np.cumsum(np.concatenate([moves, np.zeros((2, 3))]), axis=0)
     run = omnidyn.simulate(plain, volts, 0.02)
@@ -37,7 +37,7 @@ def test_its_prediction_is_the_simulated_robot():
 
 
 def test_its_limits_and_its_words():
-    control, along = controller_named("araujo", ROBOT), path("eight:period_s=2")
+    control, along = Araujo(ROBOT), path("eight:period_s=2")
     for k in range(30):
         sent = control.step(0.02 * k, np.array([-1.0, 0.5, 0.0]), np.zeros(3), along)
         assert np.all(np.abs(sent) <= 6.0)
@@ -46,4 +46,4 @@ def test_its_limits_and_its_words():
     assert control.info.status == "pose missing"
     looped = ROBOT.replace(drive=Drive.model_validate({"kind": "speed", "rate_Hz": 200.0, "kp_V_s_rad": 0.1}))
     with pytest.raises(UnsupportedError, match="araujo gives volts"):
-        controller_named("araujo", looped)
+        Araujo(looped)

@@ -70,10 +70,10 @@ def test_one_seed_is_one_noise_and_the_noise_is_as_said():
             return np.zeros(3)
 
     listener = Listener()
-    omnidyn.track(AXEBOT, "goal:x_m=0", listener, noise=0.01, duration=40.0, seed=3)
+    omnidyn.track(AXEBOT, "goal:x_m=0", listener, noise=0.01, duration=40.0, rng=3)
     heard = np.array(listener.heard)
     np.testing.assert_allclose(heard.std(axis=0), 0.01 * NOISE, rtol=0.06)
-    omnidyn.track(AXEBOT, "goal:x_m=0", listener, noise=0.01, duration=40.0, seed=3)
+    omnidyn.track(AXEBOT, "goal:x_m=0", listener, noise=0.01, duration=40.0, rng=3)
     np.testing.assert_array_equal(np.array(listener.heard), heard)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 import omnidyn
 from omnidyn.control.pid import Pid
-from omnidyn.control.speed_loop import SWIFT, check_faster, check_integral, pole_rate, pose_gains, speed_gains
+from omnidyn.control.pole_placement import SWIFT, check_faster, check_integral, pole_rate, pose_gains, speed_gains
 from omnidyn.errors import InputError
 
 RATES = np.array([6.7, 2.0, 11.0])
@@ -54,7 +54,7 @@ def test_friction_is_compensated_towards_the_path(name, latency, faster):
     robot = omnidyn.load_robot(name)
     loop = Pid(robot.replace(drive=robot.drive.replace(latency=latency)), faster=faster)
     off = np.array([2e-3, -1e-3, 3e-3])
-    way = loop.aim(off, np.array(0.0), np.zeros(3), np.zeros((3, 3))).way
+    way = loop.aim(off, np.array(0.0), np.zeros(3), np.zeros((3, 3))).friction_twist
     assert np.all(way * off > 0.0)
     assert np.all(np.abs(way) <= np.abs(off) / loop.dt)
 

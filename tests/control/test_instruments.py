@@ -7,9 +7,10 @@ import pytest
 
 import omnidyn
 from omnidyn.control.filtered_twist import FilteredTwist
-from omnidyn.control.instruments import Instruments, Readings, instruments
+from omnidyn.control.instruments import Instruments, instruments
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.pid import Pid
+from omnidyn.control.readings import Readings
 from omnidyn.control.speed_loop import SpeedLoop
 from omnidyn.errors import InputError
 from omnidyn.model.log_effects import Sensors
@@ -165,7 +166,7 @@ def test_a_loop_that_trembles_or_misses_a_step_costs_little(name, spec):
     """
     goal = "goal:x_m=0.8,y_m=0.4,heading_rad=1.2,travel_s=2,hold_s=1"
     steady = omnidyn.track(AXEBOT, goal, name, sensors=spec.partition("jitter")[0].strip(",") or None)
-    trembling = omnidyn.track(AXEBOT, goal, name, sensors=spec, seed=2)
+    trembling = omnidyn.track(AXEBOT, goal, name, sensors=spec, rng=2)
     blind = 2e-3 if name == "speed" else 0.0
     assert trembling.rmse_position < max(1.3 * steady.rmse_position, steady.rmse_position + 1e-4 + blind)
     assert trembling.rmse_heading < max(1.3 * steady.rmse_heading, steady.rmse_heading + 2e-4 + blind)

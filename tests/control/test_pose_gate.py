@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.control_mismatch import cells_of
+from benchmarks.control.control_mismatch import cells_of
 from benchmarks.control_real.robots import NUMBERS
 from omnidyn.control.pid import Pid
 from omnidyn.control.pose_gate import JUMPED, MEMORY, RATE, REPEATED, SLIPPED, TRUSTED, PoseGate

@@ -9,6 +9,7 @@ import omnidyn
 from omnidyn.control import tune as tuning
 from omnidyn.control.controllers import ControllerFile, load_controller, save_controller
 from omnidyn.control.mpc.settings import POSE, Settings
+from omnidyn.control.pushes import push_force, pushes
 from omnidyn.errors import InputError
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
@@ -102,7 +103,7 @@ def test_an_mpc_begins_with_what_follows_from_its_robot_and_its_sensors():
 
 def test_pushes_come_and_go_and_are_those_of_their_seed():
     force = np.array([2.0, 3.0, 0.1])
-    push, same, other = (tuning._pushes(force, 6.0, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    push, same, other = (pushes(force, 6.0, np.random.default_rng(seed)) for seed in (1, 1, 2))
     t = np.arange(0.0, 6.0, 0.02)
     wrenches = np.array([push(x) for x in t])
     assert np.array_equal(wrenches, [same(x) for x in t])
@@ -110,7 +111,7 @@ def test_pushes_come_and_go_and_are_those_of_their_seed():
     assert (np.abs(wrenches) <= 3.0 * force).all()
     assert 0.1 < wrenches.any(axis=1).mean() < 0.7
     np.testing.assert_allclose(
-        tuning._force(AXEBOT), np.maximum(AXEBOT.friction.axes.coulomb, 0.5 * np.array([1.5, 1.5, 0.025]))
+        push_force(AXEBOT), np.maximum(AXEBOT.friction.axes.coulomb, 0.5 * np.array([1.5, 1.5, 0.025]))
     )
 
 

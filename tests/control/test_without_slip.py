@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.control.controller import without_slip
+from omnidyn.control.without_slip import without_slip
 from omnidyn.errors import UnsupportedError
 from tests.support.codes import codes
 

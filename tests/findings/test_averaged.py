@@ -10,7 +10,7 @@ from omnidyn.identification.motors.log import averaged_statements, motor_logs
 from omnidyn.identification.motors.window_fit import fit_line
 from omnidyn.identification.motors.windows import motor_windows
 from omnidyn.logs.log import Log
-from omnidyn.logs.read_log import load_log
+from omnidyn.logs.read_log import recorded_log
 from omnidyn.logs.window_means import rows_of_mean
 from omnidyn.run import Run
 from tests.findings.redundant import ROBOT, recorded
@@ -69,7 +69,7 @@ def test_check_says_it_once():
 
 
 def test_the_case_of_a_motor_controller():
-    (finding,) = check(load_log(case("logs/averaged_speed/average20.csv"))).of("averaged")
+    (finding,) = check(recorded_log(case("logs/averaged_speed/average20.csv"))).of("averaged")
     assert finding.numbers["rows"] == 20.0
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from omnidyn.findings.check import check
-from omnidyn.logs.read_log import LogOptions, load_log
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from tests.findings.redundant import ROBOT, driven
 from tests.support.bags import BagMaker, write_mcap
 from tests.support.cases import case
@@ -57,22 +57,22 @@ def bag(tmp_path_factory):
 
 
 def test_a_gyroscope_in_degrees_is_asked_about_and_the_remedy_works(bag):
-    verdict = check(load_log(bag, ROBOT), ROBOT)
+    verdict = check(recorded_log(bag, ROBOT), ROBOT)
     assert [finding.code for finding in verdict.findings if finding.severity != "note"] == []
     doubts = [str(finding) for finding in verdict.of("not_taken")]
     (gyroscope,) = [words for words in doubts if "/imu/data/omega" in words]
     assert "no turn rate of a robot in rad/s" in gyroscope
     for options in (LogOptions(assume={"omega": "deg/s"}), LogOptions(overrides=("omega=/imu/data/omega:deg/s",))):
-        log = load_log(bag, ROBOT, options)
+        log = recorded_log(bag, ROBOT, options)
         assert np.nanmax(np.abs(log.channels["twist"][:, 2])) < 1.0
         assert [finding.code for finding in check(log, ROBOT).findings if finding.severity != "note"] == []
     # Who insists on rad/s is told by the wheels.
-    (finding,) = check(load_log(bag, ROBOT, LogOptions(assume={"omega": "rad/s"})), ROBOT).of("unit")
+    (finding,) = check(recorded_log(bag, ROBOT, LogOptions(assume={"omega": "rad/s"})), ROBOT).of("unit")
     assert finding.subject == "omega"
 
 
 def test_messages_without_a_number_are_named(bag):
-    doubts = [finding for finding in check(load_log(bag)).of("not_taken") if "/odom" in str(finding)]
+    doubts = [finding for finding in check(recorded_log(bag)).of("not_taken") if "/odom" in str(finding)]
     assert [finding.numbers["doubt"].columns for finding in doubts] == [("/odom/heading",), ("/odom/vx", "/odom/vy")]
     assert "quaternion of zeros" in str(doubts[0])
     assert [finding.numbers["doubt"].code for finding in doubts] == ["no_heading_number", "no_number"]
@@ -102,6 +102,6 @@ def test_each_bag_of_the_cases_has_one_cause(tmp_path):
     subprocess.run([sys.executable, "make.py"], cwd=tmp_path, check=True)
     found = {}
     for name in CAUSES:
-        findings = check(load_log(tmp_path / name, ROBOT), ROBOT).findings
+        findings = check(recorded_log(tmp_path / name, ROBOT), ROBOT).findings
         found[name] = [(finding.code, finding.subject) for finding in findings if finding.severity != "note"]
     assert found == CAUSES

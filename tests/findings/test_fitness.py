@@ -5,7 +5,7 @@ import pytest
 
 import omnidyn
 from omnidyn.findings.check import check, check_blocks
-from omnidyn.logs.read_log import LogOptions, load_log
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 
@@ -77,7 +77,7 @@ def test_a_run_is_checked_without_a_robot_too(run):
 
 
 def test_pwm_without_a_unit_names_what_would_settle_it(pwm):
-    verdict = check(load_log(pwm))
+    verdict = check(recorded_log(pwm))
     assert verdict.useless
     assert verdict.conclusion.numbers["reason"].code == "no_input"
     for settled in ("PWM1 .. PWM3, no unit is given", "(say `assume` d=duty/255)", "a=ticks/COUNTS_PER_TURN)"):
@@ -93,7 +93,7 @@ def test_pwm_without_a_unit_names_what_would_settle_it(pwm):
 
 
 def test_the_units_it_names_settle_it(pwm):
-    verdict = check(load_log(pwm, None, LogOptions(assume={"d": "duty/255", "a": "ticks/1000"})))
+    verdict = check(recorded_log(pwm, None, LogOptions(assume={"d": "duty/255", "a": "ticks/1000"})))
     assert good(verdict) == GOOD | {"geometry": False}
     assert words(verdict, "whole logs").endswith("with a robot file that has supply_V")
     assert words(verdict, "steady state").endswith("the force from duty; with a robot file that has supply_V")
@@ -188,7 +188,7 @@ def test_blocks_have_one_answer(run, robot):
 
 
 def test_doubts_are_told_once_for_all_blocks(pwm):
-    log = load_log(pwm)
+    log = recorded_log(pwm)
     verdict = check_blocks([log.rows(slice(0, 200)), log.rows(slice(200, 400))])
     assert len(verdict.of("not_taken")) == 2
     assert "blocks" not in verdict.of("not_taken")[0].numbers

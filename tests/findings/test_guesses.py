@@ -8,7 +8,7 @@ from omnidyn.findings.check import check
 from omnidyn.findings.finding import judged_again, rest_on_guesses
 from omnidyn.identification.log_verdicts import judged_by_fit
 from omnidyn.logs.columns.mapping import load_map
-from omnidyn.logs.read_log import LogOptions, load_log
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
 from tests.support.cases import case
@@ -25,7 +25,7 @@ def guessed(robot, size=1.0):
 def test_a_guessed_motor_is_no_reason_against_a_wheel():
     robot = load_robot(str(case("logs/guessed_motor/ssl_full.toml")))
     columns = load_map(case("logs/guessed_motor/map.toml"))
-    log = load_log(case("logs/guessed_motor/ssl_tiny.csv"), robot, LogOptions(columns))
+    log = recorded_log(case("logs/guessed_motor/ssl_tiny.csv"), robot, LogOptions(columns))
     verdict = check(log, robot)
     assert not verdict.has_errors
     (finding,) = verdict.of("dead")

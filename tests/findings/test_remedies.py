@@ -7,7 +7,7 @@ import omnidyn
 from omnidyn.findings.check import check_log
 from omnidyn.findings.remedies import remedied
 from omnidyn.logs.columns.mapping import load_map, save_map
-from omnidyn.logs.read_log import LogOptions, load_log
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from tests.support.pushed_logs import clean_log
 
 ROBOT = omnidyn.load_robot("axebot")
@@ -99,7 +99,7 @@ def broken(clean, damage, path):
 @pytest.mark.parametrize("damage", CASES, ids=lambda damage: damage.__name__)
 def test_what_a_remedy_reads_is_the_clean_log(clean, damage, tmp_path):
     path = broken(clean, damage, tmp_path / "log.csv")
-    log = load_log(path, ROBOT)
+    log = recorded_log(path, ROBOT)
     found = [f for f in check_log(log, ROBOT).findings if f.code in CASES[damage]]
     assert found, [(f.code, f.subject) for f in check_log(log, ROBOT).findings]
     options = remedied(found[0], LogOptions(), log.columns)
@@ -107,7 +107,7 @@ def test_what_a_remedy_reads_is_the_clean_log(clean, damage, tmp_path):
     assert found[0].remedy_text
     if options.columns is not None:  # what a studio does: the map as a file
         options = LogOptions(columns=load_map(save_map(options.columns, tmp_path / "map.toml")))
-    mended = load_log(path, ROBOT, options)
+    mended = recorded_log(path, ROBOT, options)
     left = {(f.code, f.subject, f.severity) for f in check_log(mended, ROBOT).findings}
     assert not left & {(f.code, f.subject, f.severity) for f in found}
     tolerance = 0.03 if damage in (late, marker, mounted_askew) else 1e-4  # of angles and lags as they were found
@@ -132,7 +132,7 @@ def test_what_a_remedy_reads_is_the_clean_log(clean, damage, tmp_path):
 
 def test_what_is_no_matter_of_reading_has_no_such_remedy(clean, tmp_path):
     path = broken(clean, lambda t, c: c["wheel_speed"].__setitem__((slice(900, 1200), 1), 3.0), tmp_path / "stuck.csv")
-    log = load_log(path, ROBOT)
+    log = recorded_log(path, ROBOT)
     findings = check_log(log, ROBOT).findings
     assert "stuck" in {f.code for f in findings}
     assert all(remedied(f, LogOptions(), log.columns) is None for f in findings)

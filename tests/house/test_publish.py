@@ -1,8 +1,9 @@
 """Tables of benchmarks go into benchmarks/results; docs/tested.md has a line for each of them."""
 
 import re
+from importlib.util import find_spec
 
-from benchmarks.__main__ import NAMES
+from benchmarks.__main__ import NAMES, module_of
 from benchmarks.publish import IMAGES, RESULTS, publish
 from benchmarks.table import Table
 
@@ -38,3 +39,12 @@ def test_the_page_for_users_has_every_result_and_no_other():
     shown = set(re.findall(r"benchmarks/results/(\w+)\.md", PAGE))
     assert shown == {file.stem for file in RESULTS.glob("*.md")}
     assert shown <= set(NAMES)
+
+
+def test_every_benchmark_is_a_module_that_measures():
+    assert [name for name in NAMES if find_spec(module_of(name)) is None] == []
+    assert {module_of(name) for name in ("house", "blind", "control")} == {
+        "benchmarks.house",
+        "benchmarks.blind",
+        "benchmarks.control.control",
+    }

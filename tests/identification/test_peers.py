@@ -3,8 +3,16 @@
 import numpy as np
 import pytest
 
-from benchmarks.identify_log import cramer_rao
-from benchmarks.identify_peers import by_sysid, installed_sysid, most_likely, our_fit, peers, residuals, run_events
+from benchmarks.identification.identify_log import cramer_rao
+from benchmarks.identification.identify_peers import (
+    by_sysid,
+    installed_sysid,
+    most_likely,
+    our_fit,
+    peers,
+    residuals,
+    run_events,
+)
 from benchmarks.table import Table
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
@@ -47,7 +55,7 @@ def test_a_log_without_noise_gives_the_truth_back(robot, clean, true):
 
 
 def test_a_peer_that_is_not_installed_is_named_with_the_way_to_get_it(monkeypatch):
-    monkeypatch.setattr("benchmarks.identify_peers.installed", lambda name: None)
+    monkeypatch.setattr("benchmarks.identification.identify_peers.installed", lambda name: None)
     table = Table("", [])
     assert [peer.name for peer in peers(table)] == ["scipy least_squares + solve_ivp (LSODA, tanh 0.01)"]
     for note, name in zip(table.notes, ("mujoco.sysid", "lmfit"), strict=True):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.stagger import OFF_NUMBER, apart, robot_of
+from benchmarks.logs.stagger import OFF_NUMBER, apart, robot_of
 from omnidyn import MotorLine, identify
 from omnidyn.logs.read_log import read_log
 from tests.support.cases import case

@@ -13,6 +13,7 @@ from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.identification.estimate import Correlation, Estimate
 from omnidyn.identification.identification import After, Identification
 from omnidyn.identification.identify import identify
+from omnidyn.identification.lack_of_fit import LackOfFit
 from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.identification.motors.study import motors_verdict
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
@@ -22,6 +23,7 @@ from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 from omnidyn.statement import ERROR, Statement
 from tests.support.axebot_logs import excitation, noisy_draw
+from tests.support.codes import codes
 
 AXEBOT = load_robot("axebot")
 
@@ -122,6 +124,14 @@ def test_a_number_whose_interval_holds_0_is_not_known():
     bound = replace(fit, value=fit.value | {BOX[1]: 0.0}, ci95=fit.ci95 | {BOX[1]: (0.0, 0.3)}, at_bound=(BOX[1],))
     assert not bound.is_known(BOX[1])
     assert bound.verdict.endswith("within 2 %; not known: viscous friction sideways.")
+
+
+def test_what_misses_next_to_nothing_does_not_stand_first():
+    small = LackOfFit(True, {"wheel_speed[0]": 0.2}, {}, (), (), {}, missed=0.002)
+    fit = replace(estimate([0.02] * 6), study=lambda: SimpleNamespace(lack_of_fit=small))
+    assert codes(fits_verdict({"": fit}, {})) == ["not_compared", "misfit_small"]
+    large = replace(fit, study=lambda: SimpleNamespace(lack_of_fit=replace(small, missed=0.2)))
+    assert codes(fits_verdict({"": large}, {})) == ["misfit_unexplained", "not_compared"]
 
 
 def test_groups_faults_and_interrupts_are_said():

@@ -2,15 +2,15 @@
 
 Where a row is tested at more depth: 13, 14, 17, 20 test_read_log.py; 19 test_guess.py, check/test_time_base.py;
 18 check/test_time_base.py, comparison/test_replay.py; 21 check/test_time_base.py; 22-26 check/test_scale.py,
-check/test_values.py, check/test_wiring.py; 27, 28 check/test_motion.py; 29 benchmarks/check.py.
+check/test_values.py, check/test_wiring.py; 27, 28 check/test_motion.py; 29 benchmarks/logs/check.py.
 """
 
 import numpy as np
 import pytest
 
-from omnidyn import SteadyState, check, identify, load_log, load_robot, read_log, simulate, write_run
+from omnidyn import SteadyState, check, identify, load_robot, read_log, simulate, write_run
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.logs.read_log import LogOptions
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from omnidyn.logs.segments import segments
 
 ROBOT = load_robot("axebot")
@@ -28,7 +28,7 @@ def run():
 
 
 def log_of(run, tmp_path, **options):
-    return load_log(write_run(run, tmp_path / "run.csv"), ROBOT, LogOptions(**options))
+    return recorded_log(write_run(run, tmp_path / "run.csv"), ROBOT, LogOptions(**options))
 
 
 def text_of(run, tmp_path):
@@ -73,7 +73,7 @@ def test_17_time_that_goes_back_is_refused(run, tmp_path):
     (tmp_path / "back.csv").write_text("\n".join(lines))
     with pytest.raises(InputError, match=r"back.csv:52: time goes back; .* use `sort`"):
         read_log(tmp_path / "back.csv")
-    assert check(load_log(tmp_path / "back.csv"), ROBOT).has_errors
+    assert check(recorded_log(tmp_path / "back.csv"), ROBOT).has_errors
 
 
 def test_18_a_gap_splits_the_log(run):

@@ -9,7 +9,7 @@ import pytest
 from omnidyn import MotorLine, identify, read_log
 from omnidyn.errors import InputError
 from omnidyn.logs.motor_table import read_motor_table
-from omnidyn.logs.read_log import load_log
+from omnidyn.logs.read_log import recorded_log
 from tests.support.cases import case
 from tests.support.codes import said
 
@@ -41,7 +41,7 @@ def test_a_log_without_a_time_is_no_table_of_points():
 
 
 def test_the_drive_is_what_the_name_says_and_no_sensor():
-    log = load_log(case("logs/sensor_volts/one_way.csv"))
+    log = recorded_log(case("logs/sensor_volts/one_way.csv"))
     assert log.columns.columns["d1"].name == "duty_pct"
     assert "u1" not in log.columns.columns
     assert any("encoder_V looks like a1, but V is no unit of an angle" in doubt for doubt in said(log.columns.doubts))
@@ -58,9 +58,9 @@ def test_a_motor_beside_its_sensors(tmp_path, file):
 @pytest.mark.parametrize(("file", "component"), [("angle.csv", "a1"), ("heading.csv", "heading")])
 def test_an_angle_that_jumps_by_360_is_asked_about(tmp_path, file, component):
     path = made("degrees_wrap", tmp_path) / file
-    log = load_log(path)
+    log = recorded_log(path)
     assert component not in log.columns.columns
-    assert "it jumps by 360 as degrees do" in said(log.columns.doubts)[0]
+    assert "it jumps as degrees do" in said(log.columns.doubts)[0]
     assert ptp(read_log(path, columns={component: f"{path.stem}:deg"}), component) > 2.0 * np.pi
 
 
@@ -88,7 +88,7 @@ def test_an_oscilloscope_has_its_units_in_the_second_line():
 def test_the_array_of_a_board_shifts_no_motor(tmp_path):
     folder = made("array_numbers", tmp_path)
     for file in ("with_board.wpilog", "without.wpilog"):
-        log = load_log(folder / file)
+        log = recorded_log(folder / file)
         names = {key: column.name for key, column in log.columns.columns.items()}
         assert [names[f"u{k}"] for k in (1, 2, 3, 4)] == [f"/drive/motor{k}/voltage_V" for k in (1, 2, 3, 4)]
         assert [names[f"w{k}"] for k in (1, 2, 3, 4)] == [f"/drive/motor{k}/velocity_rad_s" for k in (1, 2, 3, 4)]

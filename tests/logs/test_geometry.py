@@ -8,7 +8,7 @@ import pytest
 from omnidyn import load_robot
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.logs.geometry import as_mecanum, mean_speeds, turned_wheels, wheel_geometry
-from omnidyn.logs.read_log import LogOptions, load_log
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from tests.support.staggered import Logged, Topic, plant
@@ -213,7 +213,7 @@ def camera_log(path, seed, glitches=False):
 def test_counts_at_the_motor_and_cameras_show_radius_and_arm(tmp_path, seed, glitches):
     back = camera_log(tmp_path / "log.csv", seed, glitches)
     options = LogOptions(assume={"a": f"ticks/{COUNTS}@motor"}, gear_ratio=GEAR)
-    seen = wheel_geometry([load_log(tmp_path / "log.csv", options=options).to_run()])
+    seen = wheel_geometry([recorded_log(tmp_path / "log.csv", options=options).to_run()])
     assert seen.source == "pose and wheel_angle"
     assert turned_wheels(seen) == tuple(np.flatnonzero(back < 0.0) + 1)
     wheels = as_mecanum(seen)

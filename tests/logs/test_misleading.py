@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.findings.check import check
-from omnidyn.logs.read_log import LogOptions, iter_logs, load_log, read_log
+from omnidyn.logs.read_log import LogOptions, iter_logs, read_log, recorded_log
 from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.model.robot_file import load_robot
 from tests.support.codes import said
@@ -46,7 +46,7 @@ def test_a_clock_that_goes_back_over_and_over_is_not_to_be_sorted(write):
     with pytest.raises(InputError, match=r"time goes back; .*do not sort the rows") as error:
         read_log(path)
     assert "`sort`" not in str(error.value)
-    (finding,) = check(load_log(path)).of("time_back")
+    (finding,) = check(recorded_log(path)).of("time_back")
     assert "do not sort the rows" in finding.remedy_text
 
 
@@ -144,18 +144,18 @@ def three(names, rows=60):
 
 def test_a_column_that_is_mapped_is_no_longer_called_not_taken(write):
     path = write(three("speed_m1 [m/s],speed_m2 [m/s],speed_m3 [m/s]"))
-    plain = said(load_log(path).columns.doubts)
+    plain = said(recorded_log(path).columns.doubts)
     assert any("speed_m1, speed_m2, speed_m3" in words for words in plain)
-    one = said(load_log(path, options=LogOptions(overrides=("w1=speed_m1:rad/s",))).columns.doubts)
+    one = said(recorded_log(path, options=LogOptions(overrides=("w1=speed_m1:rad/s",))).columns.doubts)
     assert any("speed_m2, speed_m3" in words for words in one)
     assert not any("speed_m1" in words for words in one)
 
 
 def test_the_speed_of_a_rim_is_called_that(write):
-    (words,) = said(load_log(write(three("speed_m1 [m/s],speed_m2 [m/s],speed_m3 [m/s]"))).columns.doubts)
+    (words,) = said(recorded_log(write(three("speed_m1 [m/s],speed_m2 [m/s],speed_m3 [m/s]"))).columns.doubts)
     assert "m/s is the speed of its rim: name the robot, whose radius of the wheels makes rad/s of it" in words
     assert "`assume`" not in words
-    (words,) = said(load_log(write(three("v1_m_s,v2_m_s,v3_m_s"))).columns.doubts)
+    (words,) = said(recorded_log(write(three("v1_m_s,v2_m_s,v3_m_s"))).columns.doubts)
     assert words.startswith("v1_m_s, v2_m_s, v3_m_s look like w1, w2, w3, but m/s is the speed of its rim")
 
 
@@ -163,7 +163,7 @@ def test_the_speed_of_a_rim_is_called_that(write):
 def test_the_speed_of_a_rim_is_that_of_the_wheel_times_its_radius(write, names):
     """It was left out, or taken for nothing. The gear has no part in it, whatever the name says."""
     robot = load_robot("axebot")
-    log = load_log(write(three(",".join(names.format(k) for k in (1, 2, 3)))), robot)
+    log = recorded_log(write(three(",".join(names.format(k) for k in (1, 2, 3)))), robot)
     size = 1e-3 if "mm" in names else 1.0
     assert log.channels["wheel_speed"] == pytest.approx(size * np.outer(np.arange(60), [13, 17, 7]) / 0.035)
     assert not said(log.columns.doubts)
@@ -172,36 +172,36 @@ def test_the_speed_of_a_rim_is_that_of_the_wheel_times_its_radius(write, names):
 
 def test_a_rim_may_be_given_by_hand(write):
     robot, path = load_robot("axebot"), write(three("p,q,r"))
-    log = load_log(path, robot, LogOptions(overrides=("a1=p:mm", "w2=q:cm/s")))
+    log = recorded_log(path, robot, LogOptions(overrides=("a1=p:mm", "w2=q:cm/s")))
     assert log.channels["wheel_angle"][:, 0] == pytest.approx(1e-3 * 13 * np.arange(60) / 0.035)
     assert log.channels["wheel_speed"][:, 1] == pytest.approx(1e-2 * 17 * np.arange(60) / 0.035)
     with pytest.raises(InputError, match=r"w2 is that of a rim: without its radius it is no angle; got q \[cm/s\]"):
-        load_log(path, options=LogOptions(overrides=("w2=q:cm/s",)))
+        recorded_log(path, options=LogOptions(overrides=("w2=q:cm/s",)))
     with pytest.raises(InputError, match="what is in metres is of the rim, behind the gear; got w2: q"):
-        load_log(path, robot, LogOptions(overrides=("w2=q:m/s@motor",)))
+        recorded_log(path, robot, LogOptions(overrides=("w2=q:m/s@motor",)))
     with pytest.raises(InputError, match="u1 cannot have this unit; got m/s"):
-        load_log(path, robot, LogOptions(overrides=("u1=p:m/s",)))
+        recorded_log(path, robot, LogOptions(overrides=("u1=p:m/s",)))
 
 
 def test_an_assumed_unit_of_nothing_is_said(write):
     path = write(three("w1,w2,w3"))
-    doubts = said(load_log(path, options=LogOptions(assume={"z": "rpm", "w": "rpm"})).columns.doubts)
+    doubts = said(recorded_log(path, options=LogOptions(assume={"z": "rpm", "w": "rpm"})).columns.doubts)
     assert doubts == ("`assume` z=rpm is used for no column: there is none of this name or kind",)
     for fine in ({"w": "rpm"}, {"w2": "rpm"}):
-        assert said(load_log(path, options=LogOptions(assume=fine)).columns.doubts) == ()
+        assert said(recorded_log(path, options=LogOptions(assume=fine)).columns.doubts) == ()
 
 
 def test_counts_called_a1_are_taken_where_their_unit_is_said(write):
     path = write(three("a1,a2,a3"))
-    log = load_log(path, options=LogOptions(assume={"a": "ticks/2000"}))
+    log = recorded_log(path, options=LogOptions(assume={"a": "ticks/2000"}))
     assert [column.unit for key, column in log.columns.columns.items() if key != "t"] == ["ticks/2000"] * 3
     assert log.channels["wheel_angle"][10, 0] == pytest.approx(130 / 2000 * 2 * np.pi)
     assert log.columns.unused == ()
-    assert load_log(path).columns.unused == ("a1", "a2", "a3")  # of accelerations nothing is assumed
+    assert recorded_log(path).columns.unused == ("a1", "a2", "a3")  # of accelerations nothing is assumed
 
 
 def test_a_doubtful_column_is_listed_once(write):
-    columns = load_log(write(three("speed_m1 [m/s],speed_m2 [m/s],mood"))).columns
+    columns = recorded_log(write(three("speed_m1 [m/s],speed_m2 [m/s],mood"))).columns
     assert columns.unused == ("speed_m1", "speed_m2", "mood")
     assert columns.passed_over == ("mood",)
 
@@ -212,8 +212,8 @@ def test_a_unit_may_be_said_of_all_columns_of_one_name(tmp_path):
     path.write_text(
         "t_s,pwm_1,pwm_2,pwm_3,enc1,enc2,enc3\n" + "".join(f"{k / 50},9,0,{k},{k},0,{k}\n" for k in range(99))
     )
-    by_name = load_log(path, options=LogOptions(assume={"enc": "ticks/1440", "pwm": "duty/255"}))
-    by_letter = load_log(path, options=LogOptions(assume={"a": "ticks/1440", "d": "duty/255"}))
+    by_name = recorded_log(path, options=LogOptions(assume={"enc": "ticks/1440", "pwm": "duty/255"}))
+    by_letter = recorded_log(path, options=LogOptions(assume={"a": "ticks/1440", "d": "duty/255"}))
     for name in ("wheel_angle", "duty"):
         assert np.array_equal(by_name.channels[name], by_letter.channels[name])
     assert "assume" not in " ".join(said(by_name.columns.doubts))

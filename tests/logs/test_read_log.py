@@ -7,7 +7,7 @@ from omnidyn import load_robot
 from omnidyn.errors import InputError
 from omnidyn.findings.check import check_blocks
 from omnidyn.logs.log import component
-from omnidyn.logs.read_log import LogOptions, iter_logs, load_log, read_log
+from omnidyn.logs.read_log import LogOptions, iter_logs, read_log, recorded_log
 from omnidyn.logs.run_file import write_run
 from omnidyn.run import Run
 from tests.support.codes import codes, said
@@ -117,7 +117,7 @@ def test_a_log_on_change_holds_commands_and_makes_nothing_up(tmp_path):
 def test_a_sensor_that_is_out_for_long_is_no_log_on_change(tmp_path):
     rows = [f"{0.1 * k:.1f},{k % 5},{'' if 40 <= k < 80 else k}" for k in range(100)]
     path = write(tmp_path, "t_s,u1_V,w1_rad_s\n" + "\n".join(rows))
-    run, log = read_log(path), load_log(path)
+    run, log = read_log(path), recorded_log(path)
     assert "on_change" not in codes(run.warnings)
     filled = log.aligned("wheel_speed", log.channels["wheel_speed"], [])
     np.testing.assert_array_equal(np.isnan(filled[:, 0]), (np.arange(100) >= 40) & (np.arange(100) < 80))
@@ -141,7 +141,7 @@ def test_a_command_on_change_is_held_however_long(tmp_path):
 def test_a_log_on_change_has_gaps_too(tmp_path):
     """The line is drawn between the measurements on change, not across the time when there was none."""
     rows = [f"{0.1 * k:.1f},{k % 5},{'' if 40 <= k < 80 or k % 3 else k}" for k in range(121)]
-    log = load_log(write(tmp_path, "t_s,u1_V,w1_rad_s\n" + "\n".join(rows)))
+    log = recorded_log(write(tmp_path, "t_s,u1_V,w1_rad_s\n" + "\n".join(rows)))
     words: list[str] = []
     filled = log.aligned("wheel_speed", log.channels["wheel_speed"], words)[:, 0]
     known = (np.arange(121) <= 39) | (np.arange(121) >= 81)
@@ -222,7 +222,7 @@ def test_unsigned_currents_get_the_sign_of_the_command(tmp_path):
     text = "t_s,i1_A,i2_A,i3_A,w1_cmd_rad_s,w2_cmd_rad_s,w3_cmd_rad_s\n0,1,2,3,5,-5,0\n0.1,1,2,3,-5,5,1\n"
     run = read_log(write(tmp_path, text), current_unsigned=True)
     np.testing.assert_array_equal(run.current, [[1, -2, 0], [-1, 2, 3]])
-    assert load_log(write(tmp_path, text), None, LogOptions(current_unsigned=True)).current_unsigned
+    assert recorded_log(write(tmp_path, text), None, LogOptions(current_unsigned=True)).current_unsigned
     alone = write(tmp_path, "t_s,i1_A\n0,1\n0.1,2\n", "alone.csv")
     with pytest.raises(InputError, match="cannot give unsigned currents a sign"):
         read_log(alone, current_unsigned=True)
@@ -268,7 +268,7 @@ def test_more_wheels_than_the_robot_has_are_refused(tmp_path):
 
 
 def test_a_component_of_a_log(tmp_path):
-    log = load_log(write(tmp_path, "t_s,w1_rad_s,yaw_rad\n0,1,2\n0.1,2,3\n"))
+    log = recorded_log(write(tmp_path, "t_s,w1_rad_s,yaw_rad\n0,1,2\n0.1,2,3\n"))
     np.testing.assert_array_equal(component(log, "w1"), [1, 2])
     np.testing.assert_array_equal(component(log, "heading"), [2, 3])
     assert component(log, "x") is None

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from omnidyn.findings.check import check
-from omnidyn.logs.read_log import LogOptions, load_log
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from omnidyn.model.robot_file import load_robot, robot_from_dict
 from omnidyn.statement import ERROR
 
@@ -19,7 +19,7 @@ POSE = ("x=xpos:1.84 mm", "y=ypos:1.84 mm")
 def robotino(path, unsigned=True, pose=True):
     """The verdict on one Robotino log; the current gets the sign of the commanded speed where asked."""
     options = LogOptions(overrides=POSE if pose else (), current_unsigned=unsigned)
-    return check(load_log(path, ROBOTINO, options), ROBOTINO)
+    return check(recorded_log(path, ROBOTINO, options), ROBOTINO)
 
 
 @pytest.fixture(scope="session")
@@ -160,7 +160,7 @@ UDEA = robot_from_dict(
 
 @cache
 def udea(path):
-    return check(load_log(path, UDEA, LogOptions(assume={"u": "%"})), UDEA)
+    return check(recorded_log(path, UDEA, LogOptions(assume={"u": "%"})), UDEA)
 
 
 def test_positive_pwm_turns_the_heading_negative(data):
@@ -197,7 +197,7 @@ def test_the_last_row_has_no_duty(data):
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_the_camera_shoots_up_to_17_rad_per_s(data, number):
     path = data / "udea_three_omni" / "video_trajectories" / f"traj_vid_{number}.csv"
-    verdict = check(load_log(path), UDEA)
+    verdict = check(recorded_log(path), UDEA)
     (burst,) = [finding for finding in verdict.of("burst") if finding.subject == "omega"]
     assert 16.0 < abs(burst.numbers["farthest"]) < 19.0
     # Nothing else but that vx and vy are the rates of x and y, whatever the heading is.
@@ -225,7 +225,7 @@ def test_the_drop_out_of_exp5(data):
 
 def odrive(data, name, step="0.000125 s"):
     options = LogOptions(overrides=(f"t=timestep (8Hz):{step}",))
-    return check(load_log(data / "odrive_umn" / "demo_data" / f"{name}.csv", None, options))
+    return check(recorded_log(data / "odrive_umn" / "demo_data" / f"{name}.csv", None, options))
 
 
 @pytest.mark.parametrize("name", ["step1", "step2", "chirp1", "chirp2", "noise1", "noise2"])

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks import real_fit, udea
+from benchmarks.real import real_fit, udea
 from omnidyn import MotorFit, identify
 from omnidyn.identification.motors.choice import choose_motor, fit_rmse
 from omnidyn.identification.motors.fit import fit_motor
@@ -58,7 +58,7 @@ def test_the_way_is_chosen_on_training_logs_alone(bench):
     By the sum of squares it was the mean of two rows, which predicts chirp1 better and all of step1 worse.
     """
     choice = choose_motor([runs[0] for runs in bench.values()])
-    assert choice.way == {"between": "curve", "latency": True, "dead_band": False}
+    assert choice.options == {"between": "curve", "latency": True, "dead_band": False}
     assert choice.comparison.better > 0.7 * choice.comparison.blocks
     assert fit_rmse(choice.fit, bench["chirp"][1]) / TURN <= 1.1 * 0.051
     assert fit_rmse(choice.fit, bench["step"][1]) / TURN <= 1.1 * 0.044

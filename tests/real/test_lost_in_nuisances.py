@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks import real_nuisances, udea
+from benchmarks.real import real_nuisances, udea
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.run import Run

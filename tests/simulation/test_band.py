@@ -62,7 +62,7 @@ def test_the_same_seed_is_the_same_band_whatever_the_threads(monkeypatch):
     assert one == confidence_band(robot, FORWARD, 2e-3, draws=20)
     monkeypatch.setattr("os.cpu_count", lambda: 1)
     assert one == confidence_band(robot, FORWARD, 2e-3, draws=20)
-    assert one.high != confidence_band(robot, FORWARD, 2e-3, draws=20, seed=1).high
+    assert one.high != confidence_band(robot, FORWARD, 2e-3, draws=20, rng=1).high
 
 
 def test_it_takes_what_simulate_takes():

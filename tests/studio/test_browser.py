@@ -271,7 +271,7 @@ def test_the_dead_zone_is_felt_and_the_drive_is_fitted(browser, tmp_path):
         page.keyboard.up(key)
     counts = "(d => [performance.now() / 1000, d.received, d.painted])(document.querySelector('omni-drive'))"
     before, memory = np.array(page.evaluate(counts)), resident(studio)
-    for part in range(2):  # 15 s, recorded in the first half; minutes of it: benchmarks/studio.py
+    for part in range(2):  # 15 s, recorded in the first half; minutes of it: benchmarks/skins/studio.py
         for key in 3 * "wqase":
             page.keyboard.down(key)
             page.wait_for_timeout(500)
@@ -282,7 +282,7 @@ def test_the_dead_zone_is_felt_and_the_drive_is_fitted(browser, tmp_path):
     rates = np.diff([before, page.evaluate(counts)], axis=0)[0]
     rates = rates[1:] / rates[0]
     print(f"{rates[0]:.1f} frames a second, {rates[1]:.1f} painted")
-    assert rates.min() > 0.0  # how many: benchmarks/studio.py
+    assert rates.min() > 0.0  # how many: benchmarks/skins/studio.py
     assert resident(studio) - memory < 5.0
     page.keyboard.down("w")
     shown(page, "drive")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import omnidyn
+from omnidyn.model.deadzone import axis_patterns, breakaway_voltage
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.surroundings import Floor
 from omnidyn.model.variations import Surface, Variations
@@ -48,7 +49,7 @@ def test_every_preset_can_be_driven(tmp_path, name):
 
 def test_the_robot_rests_inside_its_dead_zone_and_goes_on_under_other_numbers(tmp_path):
     robot = omnidyn.load_robot("axebot")
-    volts = float(omnidyn.breakaway_voltage(robot, omnidyn.axis_patterns(robot))[0])
+    volts = float(breakaway_voltage(robot, axis_patterns(robot))[0])
     _, inside, _ = drive(robot, tmp_path, {"axes": [1, 0, 0], "level": 0.999 * volts})
     assert all(value == 0.0 for value in inside[-1][4:7])
     driven, outside, _ = drive(robot, tmp_path, {"axes": [1, 0, 0], "level": 1.01 * volts})

@@ -112,7 +112,8 @@ class CController:
         """As a Controller."""
         elapsed, self._t = 0.0 if self._t is None else t - self._t, t
         motion = path.at(t + self._ahead)
-        return self.call(elapsed, pose, twist, motion.pose, motion.velocity)[1]
+        self.says, output = self.call(elapsed, pose, twist, motion.pose, motion.velocity)
+        return output
 
     @property
     def _ahead(self) -> np.ndarray:

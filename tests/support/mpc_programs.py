@@ -9,12 +9,13 @@ import numpy as np
 
 from omnidyn import load_robot
 from omnidyn.compiled.kernel import kernel
-from omnidyn.control.mpc.interior_point import ROOM_SIZE, QuadraticProgram, is_inaccurate, solve
+from omnidyn.control.mpc.columns import ANSWER_SIZE, CP, CV, GX, GY, HP, HV, PULL, STAGE_SIZE, WEIGHT, E, V
+from omnidyn.control.mpc.interior_point import ROOM_SIZE, QuadraticProgram
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import ESTIMATE_SIZE, SCALE
 from omnidyn.control.mpc.program import make_costs, make_stages
-from omnidyn.control.mpc.riccati import ANSWER_SIZE, CP, CV, GX, GY, HP, HV, PULL, STAGE_SIZE, WEIGHT, E, V
 from omnidyn.control.mpc.settings import Settings
+from omnidyn.control.mpc.solve import is_inaccurate, solve
 
 SPREAD = np.array([0.3, 0.3, 1.0, 1.0, 1.0, 6.0])  # of states, as in the stress test of the peers
 

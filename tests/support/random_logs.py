@@ -1,4 +1,4 @@
-"""Clean logs of random robots, to check and to put faults into (benchmarks/check_faults.py).
+"""Clean logs of random robots, to check and to put faults into (benchmarks/logs/check_faults.py).
 
 A clean log is a simulated run of a random robot (box or disc friction or a turning frame, three or four wheels, its
 robot file exact) under commands that a user would give, seen through sensors with noise, steps and jitter.

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from omnidyn.logs.read_log import LogOptions, load_log, read_log
+from omnidyn.logs.read_log import LogOptions, read_log, recorded_log
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -61,7 +61,7 @@ def odrive(data: Path, kinds: Sequence[str]) -> list[Run]:
     """Runs of a motor on a bench: "step", "chirp", "noise", "impulse", two of each."""
     paths = [data / "odrive_umn" / "demo_data" / f"{kind}{k}.csv" for kind in kinds for k in (1, 2)]
     options = LogOptions(overrides=(f"t=timestep (8Hz):{TIME_STEP}",))
-    return [load_log(path, None, options).to_run() for path in paths]
+    return [recorded_log(path, None, options).to_run() for path in paths]
 
 
 def without_mass(robot: Robot) -> Robot:

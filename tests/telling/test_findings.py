@@ -9,7 +9,7 @@ import omnidyn
 from omnidyn import shown
 from omnidyn.cli import main
 from omnidyn.findings.finding import Finding, Verdict
-from omnidyn.logs.read_log import LogOptions, load_log
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from omnidyn.statement import ERROR, Statement
 from omnidyn.telling.log_verdict import in_brief, of_several
 from tests.support.codes import codes
@@ -76,18 +76,18 @@ def test_no_number_of_check_depends_on_a_sentence(before, faulty, capsys, reques
 
 
 def test_a_doubt_says_what_settles_it(faulty):
-    (finding,) = omnidyn.check(load_log(faulty, ROBOT), ROBOT).of("not_taken")
+    (finding,) = omnidyn.check(recorded_log(faulty, ROBOT), ROBOT).of("not_taken")
     doubt = finding.numbers["doubt"]
     assert (doubt.code, doubt.columns, doubt.components) == ("command_without_unit", ("PWM1",), ("d1",))
     assert doubt.declarations == (("assume", "d=%"), ("assume", "d=duty/255"))
     assert str(finding) == "PWM1 looks like d1, but no unit is given, and up to 40 may be percent: not taken"
     assert finding.remedy_text == "say `assume` d=% or `assume` d=duty/255"
-    settled = load_log(faulty, ROBOT, LogOptions(assume={"d": "%"}))
+    settled = recorded_log(faulty, ROBOT, LogOptions(assume={"d": "%"}))
     assert "d1" in settled.columns.columns
 
 
 def test_sentences_of_a_log(faulty):
-    verdict = omnidyn.check(load_log(faulty, ROBOT), ROBOT)
+    verdict = omnidyn.check(recorded_log(faulty, ROBOT), ROBOT)
     swapped, gap, spike = verdict.findings[:3]
     assert str(swapped).startswith("wheel_speed against voltage and current of the same motor: w1 and w2 are exchanged")
     assert str(gap) == "1 gap, about 65 rows lost; the longest lasts 1.32 s, at t = 4 s"
@@ -98,7 +98,7 @@ def test_sentences_of_a_log(faulty):
 
 
 def test_a_default_text_is_short_and_names_what_it_leaves_out(faulty):
-    verdict = omnidyn.check(load_log(faulty, ROBOT), ROBOT)
+    verdict = omnidyn.check(recorded_log(faulty, ROBOT), ROBOT)
     lines = in_brief(verdict, 110).to_text(110).splitlines()
     assert len(lines) <= 3 + 1 + 15  # the verdict, an empty line, the rest
     several = of_several({f"logs/{k}.csv": verdict for k in range(30)} | {"logs/x.csv": None}, 110).to_text(110)

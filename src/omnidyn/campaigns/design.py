@@ -2,7 +2,8 @@
 
 Random draws are places of one stream (PCG64), Sobol points of one scrambled sequence (Owen; scipy.stats.qmc), a Latin
 hypercube (McKay, Beckman, Conover, Technometrics 21 (1979)) is drawn whole, and a grid counts its last variable first.
-A number follows from its point u, 0 to 1: low + u (high - low), low (high/low)^u, or mean + std Phi^-1(u).
+[correlation] mixes points as normals. A number follows from its point u, 0 to 1: low + u (high - low),
+low (high/low)^u, or mean + std Phi^-1(u).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from omnidyn.arrays import FloatArray
 from omnidyn.campaigns.spec import GRID, LATIN, LOG, RANDOM, Spec, Variable
@@ -29,6 +30,23 @@ def sample_count(spec: Spec) -> int:
 
 
 def points(spec: Spec, start: int, stop: int) -> FloatArray:
+    """Points of the samples start to stop, correlated as the spec says. Shape (stop - start, variables).
+
+    u = Phi(L z), z = Phi^-1 of independent points, L L^T = the correlation (a Gaussian copula).
+    """
+    u = independent_points(spec, start, stop)
+    if spec.correlation is None:
+        return u
+    values, vectors = np.linalg.eigh(spec.correlation.of(tuple(spec.vary)))
+    root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T  # symmetric: no variable comes first
+    z, mixed = ndtri(np.clip(u, INNERMOST, 1.0 - INNERMOST)), np.zeros_like(u)
+    for column in range(u.shape[1]):  # summed in a fixed order: where shards are cut changes no bit
+        mixed += z[:, column, None] * root[column]
+    free = np.isclose(root.diagonal(), 1.0, atol=1e-12)  # what is correlated with nothing stays as it is
+    return np.where(free, u, ndtr(mixed))
+
+
+def independent_points(spec: Spec, start: int, stop: int) -> FloatArray:
     """Points of the samples start to stop in the unit cube, one column a variable. Shape (stop - start, variables)."""
     size = len(spec.vary)
     if not size:

@@ -5,6 +5,7 @@ Nothing listens here: processes of a pool talk by pipes; a cluster was started b
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import signal
@@ -35,7 +36,9 @@ Calls = Iterable[tuple[int, tuple[Any, ...]]]
 
 
 class ShardPool(Protocol):
-    """Where shards run."""
+    """Where shards run. workers: how many at once; 1 where nobody says."""
+
+    workers: int
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """What a function gives in a process that works; None where it fails."""
@@ -53,7 +56,7 @@ def opened(executor: Executor | None, scheduler: str, workers: int | None) -> It
         yield Given(executor)
     elif scheduler:
         with _dask(scheduler) as client:
-            yield Given(client.get_executor(retries=RETRIES))
+            yield Given(client.get_executor(retries=RETRIES), "the Dask scheduler")
     else:
         pool = Processes(workers or processors())
         try:
@@ -79,17 +82,32 @@ def _dask(scheduler: str) -> Iterator[Any]:
             remedy="start one with `dask scheduler`, and workers with `dask worker`",
             where="scheduler",
         ) from None
+    with _quiet("distributed"):
+        try:
+            yield client
+        finally:
+            client.close()
+
+
+@contextmanager
+def _quiet(library: str) -> Iterator[None]:
+    """Within it a library logs nothing: what happens to a cluster is said in one sentence, not as tracebacks."""
+    loggers = [logging.getLogger(name) for name in logging.root.manager.loggerDict if name.startswith(library)]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
     try:
-        yield client
+        yield
     finally:
-        client.close()
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 class Given:
-    """An executor of the user: it gets all shards at once, and is left as it was."""
+    """An executor of the user: it gets all shards at once, and is left as it was. name: what it is called."""
 
-    def __init__(self, executor: Executor) -> None:
-        self.executor = executor
+    def __init__(self, executor: Executor, name: str = "the executor") -> None:
+        self.executor, self._name, self.workers = executor, name, getattr(executor, "_max_workers", 1)
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """What a function gives; None where it fails."""
@@ -104,29 +122,28 @@ class Given:
         try:
             while futures:
                 for future in wait(futures, return_when=FIRST_COMPLETED).done:
-                    yield futures.pop(future), _words(future)
+                    yield futures.pop(future), self._words(future)
         except BaseException as raised:
             running = [future for future in futures if not future.cancel()]
             if isinstance(raised, Exception):  # nobody may write any more when this has ended; an interrupt waits not
                 wait(running)
             raise
 
-
-def _words(future: Future[None]) -> str:
-    """Why a call failed, where it could not say so itself. Raises what ends all."""
-    try:
-        future.result()
-    except OmnidynError:
-        raise
-    except (BrokenExecutor, CancelledError) as error:
-        raise OmnidynError(
-            "the executor has ended",
-            got=type(error).__name__,
-            remedy="make a new one and go on: what is done stays",
-        ) from error
-    except Exception:  # such as a worker of Dask that ended again and again
-        return f"{ENDED}\n{traceback.format_exc()}"
-    return ""
+    def _words(self, future: Future[None]) -> str:
+        """Why a call failed, where it could not say so itself. Raises what ends all."""
+        try:
+            future.result()
+        except OmnidynError:
+            raise
+        except (BrokenExecutor, CancelledError) as error:
+            raise OmnidynError(
+                f"{self._name} has ended",
+                got=type(error).__name__,
+                remedy="start it again and go on with `resume`: what is done stays",
+            ) from error
+        except Exception:  # such as a worker of Dask that ended again and again
+            return f"{ENDED}\n{traceback.format_exc()}"
+        return ""
 
 
 class Processes:

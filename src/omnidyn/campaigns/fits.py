@@ -23,15 +23,18 @@ from omnidyn.identification.output_error.prepare import expand_keys
 from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.identification.validation import FITTED, HELD_OUT
 from omnidyn.logs.columns.mapping import load_map
-from omnidyn.logs.read_log import LogOptions, load_log
+from omnidyn.logs.log import Log
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from omnidyn.logs.readers.folders import files_of, is_log_folder, natural
 from omnidyn.logs.readers.read_table import logs_in
+from omnidyn.logs.table.text_file import FILE_CUT_SHORT
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.statement import ERROR, SEVERITIES, Statement
 
 LOG, VERDICT = "log", "verdict"  # the variable that the logs are; the column of the code of each fit
 ENDS = ("low", "high")  # of the 95 % interval of a number, behind its name
+KNOWN = "known_share"  # column: the share of the numbers of a fit that the log determines
 Row = dict[str, bool | float | str | None]
 
 
@@ -129,16 +132,26 @@ def fit_row(name: str, robot: Robot, task: IdentifyTask, hashes: Mapping[str, st
         if hashes and hashes.get(str(file)) != file_sha256(file):
             raise InputError("the log has changed since the campaign began", where=str(file))
     try:
-        logs = [load_log(path, robot, _options(task)) for path in paths]
+        logs = [recorded_log(path, robot, _options(task)) for path in paths]
         runs = [log.to_run(sort=task.read.sort) for log in logs]
     except (InputError, InsufficientDataError) as error:
         return _row_without_numbers(Statement("log_not_read", ERROR, name, {"error": str(error)}))
     try:
         hold_out = [glob.escape(path) for path in paths if path in held_out]
         method = task.method_asked()
-        return _row(identify(runs, robot, method, hold_out=hold_out, quick=task.quick, check=logs))
+        row = _row(identify(runs, robot, method, hold_out=hold_out, quick=task.quick, check=logs))
+        return row | _cut_short(name, logs)
     except (InputError, InsufficientDataError) as error:
         return _row_without_numbers(Statement("log_not_fitted", ERROR, name, {"error": str(error)}))
+
+
+def _cut_short(name: str, logs: Iterable[Log]) -> Row:
+    """What a row says where a file of its logs ends too early: its numbers are of what was there."""
+    notes = [note for log in logs for note in log.notes if note.code == FILE_CUT_SHORT]
+    if not notes:
+        return {}
+    statement = Statement("fit_of_part", ERROR, name, {"why": str(notes[0])})
+    return {"ok": False, VERDICT: statement.code, "words": str(statement)}
 
 
 def _row_without_numbers(statement: Statement) -> Row:
@@ -162,6 +175,7 @@ def _row(result: Identification) -> Row:
     if isinstance(estimate, OutputErrorEstimate):
         numbers |= {key: (nuisance.value, nuisance.ci95) for key, nuisance in estimate.nuisances.items()}
     unknown = {*estimate.unidentifiable}
+    row[KNOWN] = sum(key not in unknown for key in numbers) / len(numbers) if numbers else None
     for key, (value, ends) in numbers.items():
         low, high = (math.nan, math.nan) if key in unknown else ends
         row |= {f"fit.{key}": value, f"fit.{key}.{ENDS[0]}": low, f"fit.{key}.{ENDS[1]}": high}

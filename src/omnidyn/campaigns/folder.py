@@ -1,6 +1,6 @@
 """Folder: what a campaign keeps on disk, so that nothing is lost, whatever ends.
 
-manifest.json            spec, hashes of inputs and task, version, samples, rows of a shard: written once
+manifest.json            spec, hashes of inputs and task, version, samples, rows of a shard
 inputs/                  the files that the spec names, copied
 shards/00000.parquet     one shard: sample, what varied, what was measured. Written whole or not at all, never changed
 shards/00000.json        its record, written after it: a shard without one is not done. Who reads a shard compares them
@@ -17,10 +17,11 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from omnidyn.campaigns.manifest import WORD, Manifest, ShardRecord
 from omnidyn.campaigns.spec import INPUTS, Spec, parse_spec
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.files import file_sha256, open_atomic, read_text, sha256, write_atomic
@@ -30,102 +31,7 @@ MANIFEST, SHARDS, LOCK, MERGED = "manifest.json", "shards", "lock", "merged.parq
 DONE, RECORD, FAILED = ".parquet", ".json", ".failed"
 SAMPLE = "sample"
 GROUP_ROWS = 2**16  # rows of a group of the merged file
-WORD = "omnidyn campaign"
 CHECKED = {"page_checksum_verification": True}  # what changes while it is read is an error
-
-
-class Manifest(NamedTuple):
-    """What makes a campaign this one: two of the same manifest have the same results.
-
-    spec: its tables, files by their copies. inputs: copy -> sha256. task: "track", "simulate" or "module:function".
-    task_sha256: of the source of a function. samples; shard_rows: samples of a shard.
-    """
-
-    omnidyn: str
-    spec: dict[str, Any]
-    inputs: dict[str, str]
-    task: str
-    task_sha256: str
-    samples: int
-    shard_rows: int
-
-    @property
-    def sha256(self) -> str:
-        """Of all of it: of what was computed, from what, and by what."""
-        return sha256(self.to_json())
-
-    @property
-    def shards(self) -> int:
-        """How many shards there are."""
-        return -(-self.samples // self.shard_rows)
-
-    def rows(self, shard: int) -> tuple[int, int]:
-        """The samples of a shard: from, to."""
-        start = shard * self.shard_rows
-        return start, min(start + self.shard_rows, self.samples)
-
-    def to_json(self) -> str:
-        """The text of its file."""
-        return json.dumps({"kind": WORD, **self._asdict()}, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-    def differences(self, other: Manifest) -> list[str]:
-        """What differs in another campaign, in words; the rows of a shard are no difference."""
-        pairs = {name: (getattr(self, name), getattr(other, name)) for name in self._fields if name != "shard_rows"}
-        spec = pairs.pop("spec")
-        pairs |= dict(_leaves("", *({key: v for key, v in tables.items() if key != "shard_rows"} for tables in spec)))
-        inputs = pairs.pop("inputs")
-        changed = [
-            f"{name} has changed" for name in inputs[0] if inputs[1].get(name, inputs[0][name]) != inputs[0][name]
-        ]
-        return [f"{name}: {_text(old)} -> {_text(new)}" for name, (old, new) in pairs.items() if old != new] + changed
-
-
-def _leaves(path: str, old: Any, new: Any) -> Iterator[tuple[str, tuple[Any, Any]]]:
-    """Path of a key -> what it was and is, of two trees of tables."""
-    if not isinstance(old, Mapping) or not isinstance(new, Mapping):
-        yield path, (old, new)
-        return
-    for key in dict.fromkeys([*old, *new]):
-        yield from _leaves(f"{path}.{key}" if path else key, old.get(key), new.get(key))
-
-
-def _range(samples: tuple[int, int]) -> str:
-    return f"{samples[0]} to {samples[1] - 1}"
-
-
-def _text(value: Any) -> str:
-    return "none" if value is None else json.dumps(value, ensure_ascii=False)[:60]
-
-
-class ShardRecord(NamedTuple):
-    """What a shard was when it was written.
-
-    sha256: of its file. samples: from, to. manifest_sha256: of the manifest, which has the hashes of the inputs.
-    """
-
-    sha256: str
-    samples: tuple[int, int]
-    manifest_sha256: str
-
-    def to_json(self) -> str:
-        """The text of its file."""
-        return json.dumps(self._asdict()) + "\n"
-
-    def fault(self, path: Path) -> tuple[str, str, str] | None:
-        """(what, got, expected) where the record in a file is not this one, which is that of the shard as it is."""
-        try:
-            written = ShardRecord(**json.loads(path.read_bytes()))
-            first, last = map(int, written.samples)
-        except (ValueError, TypeError):
-            return "the record of this shard is damaged", path.name, "as a sweep wrote it"
-        if written.manifest_sha256 != self.manifest_sha256:
-            what, name = "this shard belongs to another manifest", "manifest of SHA-256"
-            return what, f"{name} {self.manifest_sha256}", f"{name} {written.manifest_sha256}"
-        if (first, last) != self.samples:
-            return "this shard holds other samples", _range((first, last)), _range(self.samples)
-        if written.sha256 != self.sha256:
-            return "this shard has changed since it was written", f"SHA-256 {self.sha256}", written.sha256
-        return None
 
 
 @dataclass(frozen=True)
@@ -178,9 +84,10 @@ class Folder:
         """The spec of the campaign, files by their copies."""
         return parse_spec(self.manifest.spec, str(self.path / MANIFEST))
 
-    def begin(self, manifest: Manifest, inputs: Mapping[str, bytes]) -> Manifest:
+    def begin(self, manifest: Manifest, inputs: Mapping[str, bytes], block: int = 1) -> Manifest:
         """Make the folder for a campaign, or find the same campaign in it: its manifest, whose shards count.
 
+        One with more samples goes on where this one ended. block: samples that are moved together.
         Raises InputError where the folder holds another campaign (what differs), or anything else.
         """
         self.path.mkdir(parents=True, exist_ok=True)
@@ -195,16 +102,35 @@ class Folder:
             except InputError:
                 if not self.exists:  # else another part of the same campaign was quicker
                     raise
-        before = self.manifest
+        before = self._grown(self.manifest, manifest, block)
         if differences := before.differences(manifest):
             raise InputError(
                 f"the folder holds another campaign ({'; '.join(differences)})",
-                expected="the same spec, inputs, task and version",
+                expected="the same spec, inputs, task and version; of sobol and random sampling, more samples",
                 remedy="take a new folder",
                 where=str(self.path),
             )
         self.check_inputs()
         return before
+
+    def _grown(self, before: Manifest, wanted: Manifest, block: int) -> Manifest:
+        """The manifest, with more samples where these are wanted; shards that would hold more are to be made again.
+
+        Raises InputError while somebody works in the folder.
+        """
+        if not before.can_grow_to(wanted):
+            return before
+        after = before.with_samples(wanted.samples)
+        with self.locked(0, after.shards):
+            self.check_inputs()
+            whole = before.samples // block * block  # a block that was not whole is driven again
+            for shard in range(before.shards):
+                if after.rows(shard) != before.rows(shard) or before.rows(shard)[1] > whole:
+                    self.shard_path(shard, RECORD).unlink(missing_ok=True)
+                    self.shard_path(shard).unlink(missing_ok=True)
+            (self.path / MERGED).unlink(missing_ok=True)
+            write_atomic(self.path / MANIFEST, after.to_json(), force=True)
+        return after
 
     def _refuse_strangers(self, inputs: Mapping[str, bytes]) -> None:
         names = {name.partition("/")[0] for name in inputs} | {SHARDS, LOCK}

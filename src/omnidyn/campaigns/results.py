@@ -4,6 +4,8 @@ Variance shares are first-order indices of Sobol (1993), S = Var E[y|x] / Var y,
 x they are cut into sqrt(n) groups, whose means vary. Of random draws, what scatters within groups moves the means too,
 and is taken off as in a one-way analysis of variance; groups of a Sobol sequence or a grid are balanced in all other
 variables. Intervals by a jackknife over blocks of neighbours, which of a Sobol sequence are balanced too.
+
+Total-order indices stand in total_shares.py.
 """
 
 from __future__ import annotations
@@ -18,10 +20,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.campaigns.design import points, sample_count
 from omnidyn.campaigns.fits import ENDS, VERDICT
 from omnidyn.campaigns.folder import CHECKED, SAMPLE, Folder, Status
 from omnidyn.campaigns.spec import GRID, SOBOL
 from omnidyn.campaigns.tasks import LoadedSpec
+from omnidyn.campaigns.total_shares import BLOCKS, total_shares
 from omnidyn.document import Document, Part, Points, Table, plain
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.logs.readers.parquet import import_pyarrow
@@ -32,7 +36,6 @@ from omnidyn.statistics import t_quantile
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-BLOCKS = 16  # of the jackknife
 FEWEST = 40  # samples from which on shares are told
 QUANTILES = (0.025, 0.5, 0.975)
 SUMMARY = ("mean", "low", "median", "high", "largest", "none")
@@ -40,12 +43,18 @@ BEST_METRICS = ("worst_position_m", "drift_m")  # what a limit is about, where n
 
 
 class Share(NamedTuple):
-    """Share of the variance of a metric that one variable makes by itself, with the ends of its 95 % interval."""
+    """Share of the variance of a metric that one variable makes by itself, with the ends of its 95 % interval.
+
+    total: the share in which it has a part, alone or together with others, with the ends of its interval.
+    """
 
     variable: str
     share: float
     low: float
     high: float
+    total: float
+    total_low: float
+    total_high: float
 
 
 class Tolerance(NamedTuple):
@@ -156,10 +165,36 @@ class Campaign(Displayable):
         there = np.isfinite(values)
         if there.sum() < FEWEST or not np.ptp(values[there]) > 0.0:
             return []
-        balanced = self.folder.spec.sampling in (SOBOL, GRID)
+        spec, y = self.folder.spec, values[there]
+        balanced = spec.sampling in (SOBOL, GRID) and spec.correlation is None
         columns = {name: self.column(name)[there] for name in self.variables}
-        shares = [Share(name, *variance_share(x, values[there], balanced)) for name, x in columns.items()]
+        totals = total_shares(self._places()[there], y, self._levels, spec.sampling == GRID and bool(there.all()))
+        if spec.correlation is not None:
+            totals = [(math.nan,) * 3] * len(totals)  # their variance has no parts
+        shares = [
+            Share(name, *variance_share(x, y, balanced), *total)
+            for (name, x), total in zip(columns.items(), totals, strict=True)
+        ]
         return sorted(shares, key=lambda share: -share.share)
+
+    @property
+    def _levels(self) -> tuple[int, ...]:
+        """How many values each variable has; 0 of a range."""
+        spec = self.folder.spec
+        if spec.sampling == GRID:
+            return spec.levels
+        return tuple(len(variable.values or ()) for variable in spec.vary.values())
+
+    def _places(self) -> FloatArray:
+        """Where the samples that are there lie, as `total_shares` takes it. Shape (samples, variables)."""
+        spec = self.folder.spec
+        places = points(spec, 0, sample_count(spec))[self.column(SAMPLE)]
+        for k, levels in enumerate(self._levels):
+            if levels:
+                values = spec.sampling == GRID and [*spec.vary.values()][k].values is None
+                scaled = np.round(places[:, k] * (levels - 1)) if values else np.floor(places[:, k] * levels)
+                places[:, k] = np.clip(scaled, 0, levels - 1)
+        return places
 
     def _is_end(self, name: str) -> bool:
         """Whether a column is the end of the interval of another one."""
@@ -177,7 +212,10 @@ class Campaign(Displayable):
             "samples": status.samples,
         }
         code = "campaign_failed" if status.failed else "campaign_done" if status.complete else "campaign_open"
-        return Statement(code, WARNING if status.failed else NOTE, self.folder.spec.name, numbers)
+        bad = int(np.sum(~self.column("ok").astype(bool))) if VERDICT in self._measured else 0
+        if bad and code == "campaign_done":
+            code, numbers["failed"] = "fits_failed", bad
+        return Statement(code, WARNING if status.failed or bad else NOTE, self.folder.spec.name, numbers)
 
     def statements(self) -> list[Statement]:
         """Shards that failed, the last line of each traceback; the first fit of each verdict that does not stand."""
@@ -224,13 +262,24 @@ class Campaign(Displayable):
             kept = [Statement("tolerance" if tolerance.inside else "no_tolerance", NOTE, name, box)]
             parts += ["", Points([statement, *(kept if tolerance.ends else [])], "-", "within")]
         if rows and (shares := self.shares(name)):
-            cells = [(s.variable, f"{100 * s.share:.0f}", f"[{100 * s.low:.0f}, {100 * s.high:.0f}]") for s in shares]
-            parts += ["", Table((f"what makes {name} vary", "% of variance", "95 %"), cells, "<>", name="shares")]
+            cells = [
+                (s.variable, *_percent(s.share, s.low, s.high), *_percent(s.total, s.total_low, s.total_high))
+                for s in shares
+            ]
+            head = (f"what makes {name} vary", "alone, %", "95 %", "with others, %", "95 %")
+            parts += ["", Table(head, cells, "<>", name="shares")]
             data["shares"] = {s.variable: s._asdict() for s in shares}
         statements = self.statements()
         parts += ["", Points(statements[:3], "-", "failed")] if statements else []
         data["warnings"] = plain(statements)
         return Document(parts, plain(data), statements, verdict=self.verdict)
+
+
+def _percent(share: float, low: float, high: float) -> tuple[str, str]:
+    """A share and its interval, in per cent."""
+    if math.isnan(share):
+        return "", ""
+    return f"{100 * share:.0f}", f"[{100 * low:.0f}, {100 * high:.0f}]"
 
 
 def _last_line(words: str) -> str:

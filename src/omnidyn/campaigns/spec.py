@@ -9,6 +9,10 @@
     "friction" = { factor = [0.5, 1.5] }
     "path.period_s" = { values = [6.0, 8.0] }
 
+    [correlation]
+    keys = ["wheels.wheel_radius_m", "friction"]
+    matrix = [[1.0, 0.5], [0.5, 1.0]]
+
     [track]
     path = "eight"
     controller = "pid"
@@ -34,6 +38,7 @@ from omnidyn.control.feedforward import DT
 from omnidyn.errors import InputError
 from omnidyn.files import MAX_TOML_BYTES, parse_toml, read_text
 from omnidyn.identification.methods import AUTO, FRICTION_METHODS, OUTPUT_ERROR, STEADY_STATE, Method, takes_names
+from omnidyn.model.correlation import KeyCorrelation
 from omnidyn.model.value import FieldType, Flag, Text, Value, from_validation, number, to_list, word_of
 
 SCHEMA = 1
@@ -220,6 +225,7 @@ class Spec(Value):
     """A campaign. samples: how many; a grid counts its own. sampling: how they are drawn. seed: of the draws.
 
     robot_draws: whether each sample is a draw from the std and correlations of the robot file, before what [vary] says.
+    correlation: of the normals behind what varies (a Gaussian copula), by keys of [vary]; of stds that of the numbers.
     shard_rows: samples in a shard; by default as many as take a second. metrics: those that are kept; all by default.
     """
 
@@ -232,6 +238,7 @@ class Spec(Value):
     shard_rows: Annotated[int, whole(1, MOST_SAMPLES)] | None = None
     metrics: Annotated[tuple[Text, ...], BeforeValidator(to_list)] = ()
     vary: dict[str, Variable] = Field(default_factory=dict)
+    correlation: KeyCorrelation | None = None
     track: TrackTask | None = None
     simulate: SimulateTask | None = None
     identify: IdentifyTask | None = None
@@ -252,11 +259,24 @@ class Spec(Value):
             raise ValueError("two tasks; expected one of [track], [simulate] and [identify]")
         if self.identify is not None and self.sampling != GRID:
             raise ValueError("[identify] fits every log with all that varies; leave out sampling")
+        if self.correlation is not None:
+            self._check_correlation(self.correlation)
         if self.sampling == GRID:
             self._check_grid()
         elif self.samples is None:
             raise ValueError("samples is missing; expected how many, such as samples = 1024")
         return self
+
+    def _check_correlation(self, correlation: KeyCorrelation) -> None:
+        if self.sampling == GRID:
+            raise ValueError("a grid takes every combination; leave out [correlation], or take another sampling")
+        if correlation.std is not None:
+            raise ValueError("[correlation] has std; expected keys and matrix: a std stands in [vary]")
+        for key in correlation.keys:
+            if key not in self.vary:
+                raise ValueError(f"[correlation] of what does not vary; got {key}; expected keys of [vary]")
+            if self.vary[key].values is not None:
+                raise ValueError(f"{key} has values, which are not correlated; expected a range, a factor or a std")
 
     def _check_grid(self) -> None:
         if self.samples is not None or self.robot_draws:

@@ -19,7 +19,8 @@ from omnidyn.campaigns.batches import batch_columns, batched, block_rows
 from omnidyn.campaigns.design import sample_count
 from omnidyn.campaigns.executors import ShardPool, opened
 from omnidyn.campaigns.fits import hashes_of, with_logs
-from omnidyn.campaigns.folder import SAMPLE, Folder, Manifest, as_columns, as_table
+from omnidyn.campaigns.folder import SAMPLE, Folder, as_columns, as_table
+from omnidyn.campaigns.manifest import Manifest
 from omnidyn.campaigns.results import Campaign
 from omnidyn.campaigns.spec import INPUTS, Spec, load_spec, parse_spec, spec_tables
 from omnidyn.campaigns.tasks import CampaignSample, Function, LoadedSpec
@@ -102,7 +103,7 @@ def _begun(home: Folder, spec: Any, function: Function | None, pool: ShardPool, 
     if local.shard_rows is None and local.identify is None and not home.exists:  # a fit is a shard
         progress(Report("timing the first samples"))
         manifest = manifest._replace(shard_rows=_rows(pool, problem))
-    return home.begin(manifest, dict(copies.values()))
+    return home.begin(manifest, dict(copies.values()), block_rows(problem))
 
 
 def _read(spec: Any) -> tuple[Spec, Path]:
@@ -204,14 +205,19 @@ def _seconds(problem: LoadedSpec) -> float:
 
 def _run(home: Folder, shards: list[int], function: Function | None, pool: ShardPool, progress: Progress) -> None:
     """Run shards, whatever happens to one of them. Raises what ends all: an interrupt, a full disk."""
-    begun, total = time.monotonic(), len(shards)
+    total, began = len(shards), math.inf
     calls = ((shard, (str(home.path), shard, function)) for shard in shards)
     progress(Report(f"{total} shards to run", 0, total))
     for done, (shard, words) in enumerate(pool.run(run_shard, calls), 1):
         if words:  # its process ended: nobody else could say so
             home.mark_failed(shard, words)
-        left = (time.monotonic() - begun) * (total - done) / done
-        progress(Report(f"shard {done} of {total}, {_time(left)} left", done, total))
+        if done == pool.workers:  # each has compiled by now, and does it once
+            began = time.monotonic()
+        phase = f"shard {done} of {total}"
+        if done > pool.workers:
+            left = (time.monotonic() - began) * (total - done) / (done - pool.workers)
+            phase += f", {_time(left)} left"
+        progress(Report(phase, done, total))
 
 
 def _time(seconds: float) -> str:

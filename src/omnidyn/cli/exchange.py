@@ -163,9 +163,9 @@ def export(
 
 def _read(path: str, robot: Robot, max_bytes: int) -> Log:
     """A log with its columns."""
-    from omnidyn.logs.read_log import LogOptions
+    from omnidyn.logs.read_log import LogOptions, recorded_log
 
-    return omnidyn.load_log(path, robot, LogOptions(max_bytes=max_bytes or None))
+    return recorded_log(path, robot, LogOptions(max_bytes=max_bytes or None))
 
 
 def _options(kind: str, make: Any, values: dict[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-import omnidyn
 from omnidyn.cli.terminal.help import MORE_PANEL
 from omnidyn.cli.terminal.streams import say
 from omnidyn.errors import InputError
@@ -206,10 +205,12 @@ def load_logs(
     files: Sequence[str], robot: Robot | None, options: LogOptions, progress: Progress = silent
 ) -> Iterator[tuple[str, Log]]:
     """Each file as a Log, in order. Raises InputError at the first that cannot be read."""
+    from omnidyn.logs.read_log import recorded_log
+
     for k, path in enumerate(files):
         if len(files) > 1:
             progress(Report(f"reading {k + 1} of {len(files)}"))
-        yield path, omnidyn.load_log(path, robot, options)
+        yield path, recorded_log(path, robot, options)
 
 
 class Maps:

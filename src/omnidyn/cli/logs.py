@@ -44,12 +44,13 @@ def convert(
     log_options.keep_inputs([log, *beside], [robot], [flags.map_file], out, flags.save_map)
     if not split:
         check_output(out, force)
+    from omnidyn.logs.read_log import recorded_log
     from omnidyn.logs.run_file import check_format
 
     check_format(out)
     options, maps = replace(flags.options(), beside=tuple(beside)), flags.maps(force)
     with shown_progress("reading"):
-        read = omnidyn.load_log(log, omnidyn.load_robot(robot) if robot else None, options)
+        read = recorded_log(log, omnidyn.load_robot(robot) if robot else None, options)
         maps.show(log, read.columns)
         runs = [part.to_run(sort=flags.sort) for part in (read.recordings() if split else [read])]
     for warning in dict.fromkeys(words for run in runs for words in run.warnings):

@@ -69,13 +69,14 @@ def track(
     keep_inputs([], [robot, plant], files, out, report, gif)
     from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
     from omnidyn.control.controllers import several
-    from omnidyn.control.instruments import instruments, told
+    from omnidyn.control.instruments import instruments
+    from omnidyn.control.readings import with_sensors
     from omnidyn.control.tracking import trackings_document
     from omnidyn.model.vary import vary_as
 
     in_file = omnidyn.load_robot(robot)
     driven, follow = vary_as(omnidyn.load_robot(plant) if plant else in_file, with_), omnidyn.path(path)
-    kit, believed = instruments(sensors or None, driven), told(in_file, sensors or None)
+    kit, believed = instruments(sensors or None, driven), with_sensors(in_file, sensors or None)
     around = Circumstances(dt, duration, skip, noise, delay, seed, sensors=kit)
     demand, options = omnidyn.path_demand(believed, follow), told_of_loop(believed, around)
     options |= {} if horizon is None else {"horizon": horizon}
@@ -180,7 +181,7 @@ def tune(
             delay=delay,
             dt=dt,
             duration=duration,
-            seed=seed,
+            rng=seed,
             sensors=sensors or None,
             progress=progress,
         )

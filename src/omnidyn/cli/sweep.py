@@ -94,6 +94,8 @@ def _run(
         )
     say(f"omnidyn: shards are in {folder}; one file of them: omnidyn sweep merge {folder}")
     _tell(campaign, metric, limit, json)
+    if campaign.verdict.code == "fits_failed":  # at the end, with everything else done
+        end_failed(campaign.verdict)
 
 
 def _merge(campaign: Campaign, out: str, force: bool) -> None:

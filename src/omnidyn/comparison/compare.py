@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from omnidyn.arguments import check_order
+from omnidyn.arguments import Rng, check_order, seed_of
 from omnidyn.comparison.errors_from_start import errors_for_whiteness
 from omnidyn.comparison.metrics import Metrics, metrics
 from omnidyn.comparison.model_bands import with_bands
@@ -36,7 +36,7 @@ def compare(
     hold: float = HOLD,
     current_unsigned: bool = False,
     tol: float | None = TOLERANCE,
-    seed: int = 0,
+    rng: Rng = 0,
     progress: Progress = silent,
     band: bool = False,
     log: LogEffects | None = None,
@@ -54,7 +54,7 @@ def compare(
         hold: How long a missing input keeps its value [s].
         current_unsigned: Compare currents by size, for a sensor without sign.
         tol: As in `simulate`.
-        seed: Of the bootstrap.
+        rng: A seed or a numpy.random.Generator of the bootstrap.
         progress: Hears what is being replayed.
         band: Whether to add how far each model may be off by the std of its robot file, from a hundred plausible
             robots (`with_bands`).
@@ -62,10 +62,18 @@ def compare(
             own logs, which are known by what they hold; others get none of it.
 
     Raises InputError when a log does not fit a robot, InsufficientDataError when there is nothing to compare.
+
+    >>> import omnidyn
+    >>> robot = omnidyn.load_robot("axebot")
+    >>> run = omnidyn.simulate(robot, [[0.0, 3.0, -3.0]] * 200, dt=0.01)
+    >>> heavier = robot.replace(body=robot.body.replace(mass=1.8))
+    >>> comparison = omnidyn.compare(robot, run, heavier)
+    >>> [bool(comparison.overall[name]["vx"].rmse < 1e-9) for name in comparison.robots]
+    [True, False]
     """
     other_robot = (Robot, type(None))
     check_order("compare(robot, run) or compare(robot, run, other)", (robot, Robot), (run, Run), (other, other_robot))
-    runs = tuple(as_list(run))
+    runs, seed = tuple(as_list(run)), seed_of(rng)
     robots = _named(robot, other)
     channels = what_is_compared([*robots.values()], runs, apply)
     replays: dict[str, list[Replay]] = {name: [] for name in robots}

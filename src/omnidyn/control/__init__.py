@@ -2,8 +2,9 @@
 
 Read in this order: controller (the one contract, a numbered list), paths/ (where to be when), demand (what a path asks
 of a robot), feedforward (the inverse model: volts for a motion; as a few numbers: table), speed_loop (body velocity in,
-volts out), pid (pose in, volts out; for many robots pid_batch), mpc/ (the same, looking ahead), policy (a network),
-araujo (a peer). What they know of the robot and its loop: instruments, pose_estimator, filtered_twist, pose_gate,
-swing. controllers: all of them by name. closed_loop (a controller and a simulated robot, step by step; its result:
-tracking), tune (gains from such runs), first_runs (whatever the compiler is needed for).
+volts out; its gains: pole_placement), pid (pose in, volts out; for many robots pid_batch), mpc/ (the same, looking
+ahead), policy (a network). What they know of the robot and its loop: instruments, readings (what these show),
+without_slip, pose_estimator, filtered_twist, pose_gate, swing. controllers: all of them by name. closed_loop (a
+controller and a simulated robot, step by step; its result: tracking), tune (gains from such runs, some with pushes),
+first_runs (whatever the compiler is needed for).
 """

@@ -5,23 +5,23 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, overload
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from omnidyn.arguments import check_order
+from omnidyn.arguments import check_order, seed_of, unknown_option
 from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import OK, Controller
 from omnidyn.control.controllers import ControllerFile, controller_named, told_apart
 from omnidyn.control.feedforward import DT, check_dt
-from omnidyn.control.instruments import MOST_JITTER, Instruments, Readings, instruments, told
+from omnidyn.control.instruments import MOST_JITTER, Instruments, instruments
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
-from omnidyn.control.tracking import Tracking, Trackings
+from omnidyn.control.readings import Readings, with_sensors
+from omnidyn.control.tracking import Tracking
 from omnidyn.errors import InputError
 from omnidyn.model.drive import DUTY, SPEED
-from omnidyn.model.log_effects import Sensors
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run
@@ -34,6 +34,7 @@ STEPS_OF_REPORT = 64  # from one report of progress to the next
 # What a noise of 1 m/s on the speeds is on the others: x, y [m], heading [rad], v_x, v_y [m/s], omega [rad/s].
 NOISE = np.array([0.2, 0.2, 0.4, 1.0, 1.0, 4.0])
 Push = tuple[float, float, float]
+OPTIONS = ("dt", "duration", "skip", "noise", "delay", "rng", "push", "supply", "sensors")  # of `track`
 
 
 @dataclass(frozen=True)
@@ -86,31 +87,30 @@ class Circumstances:
         return count
 
 
-@overload
+def circumstances(plant: Robot, allowed: Sequence[str] = OPTIONS, **options: Any) -> Circumstances:
+    """Circumstances by name, as `track` takes them: `rng` gives the seed, `sensors` may be words.
+
+    Raises InputError for a name that is not allowed, or a number out of range.
+    """
+    for name in options:
+        if name not in allowed:
+            raise unknown_option("a closed loop", name, allowed, "track")
+    delay, kit = options.get("delay", 0), instruments(options.pop("sensors", None), plant)
+    if not 0 <= delay <= MOST_DELAY or delay != int(delay):
+        raise InputError("no delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
+    options |= {"delay": int(delay), "seed": seed_of(options.pop("rng", 0))}
+    return Circumstances(**options, sensors=kit)
+
+
 def track(
-    robot: Robot, path: Any, controller: Controller | ControllerFile | str = "pid", **options: Any
-) -> Tracking: ...
-@overload
-def track(
-    robot: Robot, path: Any, controller: Sequence[Controller | ControllerFile | str], **options: Any
-) -> Trackings: ...
-def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by name
     robot: Robot,
     path: Any,
     controller: Controller | ControllerFile | str | Sequence[Controller | ControllerFile | str] = "pid",
     *,
     plant: Robot | None = None,
-    dt: float = DT,
-    duration: float | None = None,
-    skip: float = SKIP,
-    noise: float = 0.0,
-    delay: int = 0,
-    seed: int = 0,
-    push: Push | Callable[[float], Push] = (0.0, 0.0, 0.0),
-    supply: float | None = None,
-    sensors: str | Instruments | Sensors | None = None,
     progress: Progress = silent,
-) -> Tracking | Trackings:
+    **options: Any,
+) -> Tracking:
     """Drive a simulated robot along a path with a controller, and see how near it comes; or with several, one by one.
 
     The robot starts on the path, at rest. A controller that can take a delay into account is told of it, and the loop
@@ -121,38 +121,43 @@ def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by
         robot: That the controller believes to drive.
         path: A Path, or what `omnidyn.path` takes: a name, a file, a Run, an array, a function, an object of your own.
         controller: A Controller, or the name of one ("feedforward", "speed", "pid", ..), or a controller file, by path
-            or as `omnidyn.load_controller` reads it; or a list of these, for Trackings side by side.
+            or as `omnidyn.load_controller` reads it; or a list of these: the Tracking of the first has the others
+            beside it, and is a sequence of all.
         plant: The robot that is driven in truth; the same by default.
-        dt: Time between two steps [s].
-        duration: That is tracked [s]; that of the path by default.
-        skip: Errors before it count for nothing [s]: the start from rest is no error of tracking.
-        noise: Std of the measured speeds [m/s]; on omega 4 times as many rad/s, on x and y 0.2 s, on the heading 0.4 s
-            times as much. Nothing that an encoder counts has it.
-        delay: Steps until an output acts.
-        seed: Of the noise.
-        push: A wrench on the body [N, N, N m] that no model knows: a constant, or a function of the time [s].
-        supply: Behind a duty [V].
-        sensors: With which the robot is measured, such as "encoder:2048,pose:60Hz,40ms" (control/instruments.py); a
-            controller that is made here knows of them. By default those of the [sensors] of the plant's file.
         progress: Hears how far each controller is.
+        options: Of the loop, by name, in any number of:
+            dt=0.02, time between two steps [s];
+            duration, that is tracked [s], that of the path by default;
+            skip=0.5, errors before it count for nothing [s]: the start from rest is no error of tracking;
+            noise=0.0, std of the measured speeds [m/s]; on omega 4 times as many rad/s, on x and y 0.2 s, on the
+            heading 0.4 s times as much; nothing that an encoder counts has it;
+            delay=0, steps until an output acts;
+            rng=0, a seed or a numpy.random.Generator of the noise;
+            push=(0, 0, 0), a wrench on the body [N, N, N m] that no model knows: a constant, or a function of t [s];
+            supply, behind a duty [V];
+            sensors, with which the robot is measured, such as "encoder:2048,pose:60Hz,40ms" (control/instruments.py); a
+            controller that is made here knows of them. By default those of the [sensors] of the plant's file.
 
     Raises InputError for what cannot be driven, or a number out of range.
+
+    >>> import omnidyn
+    >>> robot = omnidyn.load_robot("axebot")
+    >>> several = omnidyn.track(robot, "circle", ["feedforward", "pid"], duration=2.0, noise=0.005)
+    >>> [tracking.controller for tracking in several], several.best.run.pose.shape
+    (['feedforward', 'pid'], (101, 3))
     """
     kinds = (Path, Run, str) if isinstance(path, Robot) else object
     check_order("track(robot, path, controller)", (robot, Robot), (path, kinds), (controller, object))
-    if not 0 <= delay <= MOST_DELAY or delay != int(delay):
-        raise InputError("no delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
-    kit = instruments(sensors, plant or robot)
-    around = Circumstances(dt, duration, skip, noise, int(delay), seed, push, supply, kit)
-    believed = told(robot, sensors)
+    around = circumstances(plant or robot, **options)
+    believed = with_sensors(robot, options.get("sensors"))
     follow = path_named(path)
     wanted = list(controller) if isinstance(controller, list | tuple) else [controller]
     if not wanted:
         raise InputError("no controller", got="an empty list", expected="one controller or more", where="controller")
-    options = {"supply": supply, **told_of_loop(believed, around)}
-    controllers = told_apart([_controller(entry, believed, options) for entry in wanted], wanted)
-    trackings = [tracked(plant or robot, follow, follower, around, progress) for follower in controllers]
-    return Trackings(tuple(trackings)) if isinstance(controller, list | tuple) else trackings[0]
+    of_loop = {"supply": around.supply, **told_of_loop(believed, around)}
+    controllers = told_apart([_controller(entry, believed, of_loop) for entry in wanted], wanted)
+    first, *others = [tracked(plant or robot, follow, follower, around, progress) for follower in controllers]
+    return replace(first, others=tuple(others))
 
 
 def _controller(wanted: Any, robot: Robot, options: Mapping[str, Any]) -> Controller:

@@ -37,13 +37,13 @@ from omnidyn.control.filtered_twist import FilteredTwist, filtered_twist
 from omnidyn.control.paths.adapter import as_path
 from omnidyn.control.pose_estimator import PoseEstimator, pose_estimator
 from omnidyn.control.pose_gate import JUMPED, REPEATED, SLIPPED, PoseGate
+from omnidyn.control.without_slip import without_slip
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import per_wheel
-from omnidyn.simulation.slip.plant import grips
 
 OK, WAITING, PATH_ENDED = "ok", "no step yet", "path ended: holding its last pose"
 BAD_TIME, BACKWARDS, TIME_STANDS_STILL = "time is no finite number", "time went backwards", "time stands still"
@@ -380,25 +380,3 @@ def vector(value: Any) -> FloatArray | None:
         and -LARGEST_STATE <= third <= LARGEST_STATE
     )
     return array if sane else None
-
-
-# What controllers believe of a robot whose wheels may slip: wheels that roll, and currents that keep them rolling
-
-LEAST_AMPERES = 1e-6  # [A] of the motor of a wheel that carries nothing
-
-
-def without_slip(robot: Robot) -> Robot:
-    """The robot without slip: a motor may push no harder at the rim than the floor takes, mu N (static loads).
-
-    Rotors and friction at the wheel take their part of that push, so the floor is asked for less. The same robot where
-    wheels never slip.
-    """
-    if robot.wheels.traction_mu is None:
-        return robot
-    motor, count = robot.motor, robot.wheels.count
-    push = per_wheel(motor.gear_ratio, count) * per_wheel(motor.torque_constant, count) / robot.wheels.radii  # [N/A]
-    motor_limit = per_wheel(np.inf if motor.current_limit is None else motor.current_limit, count)
-    limit = np.clip(grips(robot) / push, LEAST_AMPERES, motor_limit)
-    return robot.replace(
-        wheels=robot.wheels.replace(traction_mu=None), motor=motor.replace(current_limit=tuple(limit.tolist()))
-    )

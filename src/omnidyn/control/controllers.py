@@ -39,8 +39,8 @@ NAMES = {
     "pid": "omnidyn.control.pid:Pid",
     "mpc": "omnidyn.control.mpc.controller:Mpc",
 }
-# The same, of those that need more than a robot: a package of its own, a file.
-UNLISTED_NAMES = {"araujo": "omnidyn.control.araujo:Araujo", POLICY: "omnidyn.control.policy:Policy"}
+# The same, of those that need a file beside a robot.
+UNLISTED_NAMES = {POLICY: "omnidyn.control.policy:Policy"}
 OF_THE_CALL = ("dt", "supply", "delay")  # what the loop says, not the file
 SETTINGS = "settings"  # an argument of some controllers: a value type, whose fields are options here
 LONGEST_LIST = 16

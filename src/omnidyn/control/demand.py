@@ -10,10 +10,10 @@ import numpy as np
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
-from omnidyn.control.controller import without_slip
 from omnidyn.control.feedforward import effort_for
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
+from omnidyn.control.without_slip import without_slip
 from omnidyn.document import Document, Points, plain
 from omnidyn.model.inverse import inverse
 from omnidyn.model.robot import Robot

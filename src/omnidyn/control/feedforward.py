@@ -159,12 +159,12 @@ class Volts:
         friction = self.model.friction(now, then)
         return self.model.effort(now, self.model.wrench(0.5 * then, change, friction), change)
 
-    def softly(self, now: FloatArray, acceleration: FloatArray, way: FloatArray) -> Effort:
-        """What a motion takes, dry friction against `way` [m/s, m/s, rad/s], in proportion to it where that is slow.
+    def softly(self, now: FloatArray, acceleration: FloatArray, direction: FloatArray) -> Effort:
+        """What a motion takes, dry friction against `direction` [m/s, m/s, rad/s], in proportion where it is slow.
 
         Shapes (*batch, 3).
         """
-        friction = self.model.soft_friction(way, self.fade) - self._viscous(way - now)
+        friction = self.model.soft_friction(direction, self.fade) - self._viscous(direction - now)
         return self.model.effort(now, self.model.wrench(now, acceleration, friction))
 
     def _viscous(self, off: FloatArray) -> FloatArray:

@@ -12,6 +12,9 @@ A drive with a speed loop is asked for a twist, nu_ref + k_p e + k_i sum e dt, b
 LoopCommands). p, q: what the fast and the slow pole leave of an error in a step:
 
     k_p = (1 - p q)/dt,  k_i = (1 - p)(1 - q)/dt^2
+
+The sum is of what a model misses, and that is little. Errors for which k_p alone asks for more than SUMMED of what the
+motors can do, e > e_s, raise it by e (e_s/e)^2 and no more: a robot that is held and let go overshoots little.
 """
 
 from __future__ import annotations
@@ -28,21 +31,17 @@ from omnidyn.control.controller import WHEEL_SPEED, Guarded
 from omnidyn.control.feedforward import DT, LoopCommands, Volts, check_delay, check_dt, lateness
 from omnidyn.control.paths.ahead import Ahead
 from omnidyn.control.paths.motion import Path
-from omnidyn.control.speed_loop import (
-    MOST_STEPS,
-    SWIFT,
-    check_faster,
-    check_integral,
-    place_gains,
-    pole_rate,
-    pose_gains,
-)
+from omnidyn.control.pole_placement import SWIFT, check_faster, check_integral, place_gains, pole_rate, pose_gains
+from omnidyn.control.speed_loop import MOST_STEPS
 from omnidyn.control.swing import Swing
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.inverse import Effort
 from omnidyn.model.robot import Robot
+from omnidyn.model.sliding import top_speeds
 
 FASTER, INTEGRAL = 3.0, 0.25
+SUMMED = 0.15  # of the top speed, or of the acceleration towards it
+MOST_FAR = 1e6  # [m], [rad]
 CALM = 0.5  # of the fastest pole: that of a speed loop, whose commands show the noise of poses as it is
 
 
@@ -52,14 +51,14 @@ Three = tuple[float, float, float]
 class Aim(NamedTuple):
     """What a step of the loop shall do, but for the sum of errors.
 
-    turned: world to body, shape (*batch, 3, 3). now: twist of the path, change: acceleration wanted, way: twist which
-    friction opposes; shape (*batch, 3).
+    turned: world to body, shape (*batch, 3, 3). now: twist of the path, change: acceleration wanted. friction_twist:
+    what friction opposes; shape (*batch, 3).
     """
 
     turned: FloatArray
     now: FloatArray
     change: FloatArray
-    way: FloatArray
+    friction_twist: FloatArray
 
 
 class Pid(Guarded):
@@ -94,7 +93,7 @@ class Pid(Guarded):
     def _take(self, robot: Robot) -> None:
         super()._take(robot)
         self.late = lateness(robot, self.delay, self.dt)
-        self._swing = Swing(robot, self.dt)
+        self.swing = Swing(robot, self.dt)
         self._ahead = Ahead(self.dt, self.late, vars(self).get("_ahead"))
         if self.output == WHEEL_SPEED:
             self.commands = LoopCommands(robot, self.dt, self.friction)
@@ -105,9 +104,16 @@ class Pid(Guarded):
             self.volts = Volts(robot, self.dt, self.friction)
             self.gains = pose_gains(self.volts.held.rates, self.faster, self.integral, self.dt, self.late)
             self.home = 0.5 * pole_rate(self.volts.held.rates, self.faster, self.dt, self.late)
+        self.farthest = self._farthest()
         self._limits = tuple((self.volts if self.output != WHEEL_SPEED else self.commands).limit.tolist())
         self._current_limits = tuple(self.volts.current_limit.tolist())
         self._law = _in_numbers(*self.law())
+
+    def _farthest(self) -> tuple[float, float]:
+        """Squares of the largest errors that are summed up as they are [m^2], [rad^2]."""
+        reach = SUMMED * top_speeds(self.robot) * (1.0 if self.output == WHEEL_SPEED else self.volts.held.rates)
+        x, y, turn = np.divide(reach, self.gains.place, out=np.full(3, np.inf), where=reach > 0.0).tolist()
+        return min(x, y, MOST_FAR) ** 2, min(turn, MOST_FAR) ** 2
 
     def law(self) -> tuple[dict[str, tuple[int, ...]], Callable[..., dict[str, Any]]]:
         """What a step works out: shapes of its arguments by name, and the function of them, arrays by name."""
@@ -131,7 +137,7 @@ class Pid(Guarded):
         """Forget all steps."""
         super().reset()
         self._sum = (0.0, 0.0, 0.0)
-        self._swing.reset()
+        self.swing.reset()
         self._forget_loop()
 
     def _safe(self, word: str, start: float) -> FloatArray:
@@ -151,13 +157,19 @@ class Pid(Guarded):
         x, y, heading = pose.tolist()
         vx, vy, omega = speed = tuple(twist.tolist())
         cos, sin, (east, north) = math.cos(heading), math.sin(heading), velocity[:2]
-        self._swinging = self._swing.found(
+        self._swinging = self.swing.found(
             t, vx - cos * east - sin * north, vy + sin * east - cos * north, omega - velocity[2]
         )
         off = place[0] - x, place[1] - y, math.remainder(place[2] - heading, 2.0 * math.pi)
         dt = min(dt, MOST_STEPS * self.dt)
+        place, turn = self.farthest
+        place, turn = place / max(place, off[0] * off[0] + off[1] * off[1]), turn / max(turn, off[2] * off[2])
         sum_x, sum_y, sum_heading = self._sum
-        raised_sum = sum_x + off[0] * dt, sum_y + off[1] * dt, sum_heading + off[2] * dt
+        raised_sum = (
+            summed(sum_x, off[0] * dt, place),
+            summed(sum_y, off[1] * dt, place),
+            summed(sum_heading, off[2] * dt, turn),
+        )
         if self.output == WHEEL_SPEED:
             return self._commanded(dt, off, heading, speed, velocity, raised_sum)
         count = len(self._zeros)
@@ -228,14 +240,22 @@ class Pid(Guarded):
         if self.sensors.averaged:  # a mean is half a step old
             speed = speed - 0.5 * (then - now)
         back = self.gains.speed * (speed - twist) + self.gains.place * error
-        change, way = self.volts.change(now, then), 0.5 * (now + then) + self.home * error
+        change, friction_twist = self.volts.change(now, then), 0.5 * (now + then) + self.home * error
         if not self.feedforward:
             now, change = 0.0 * now, 0.0 * change
-        return Aim(first, now, change + back, way)
+        return Aim(first, now, change + back, friction_twist)
 
     def effort(self, aim: Aim, total: FloatArray) -> Effort:
         """What that takes, with a sum of errors in the world [m s, m s, rad s]. (*batch, 3) -> (*batch, wheels)."""
-        return self.volts.softly(aim.now, aim.change + self.gains.sum * product(aim.turned, total), aim.way)
+        return self.volts.softly(aim.now, aim.change + self.gains.sum * product(aim.turned, total), aim.friction_twist)
+
+
+def summed(total: float, more: float, weight: float) -> float:
+    """A sum of errors and one more: raised by its weight, lowered by all of it, but by what is less than 1 not beyond 0."""
+    if more * total >= 0.0:
+        return total + weight * more
+    lowered = total + more
+    return 0.0 if weight < 1.0 and lowered * total < 0.0 else lowered
 
 
 def _in_numbers(

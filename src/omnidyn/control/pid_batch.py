@@ -37,8 +37,17 @@ class PidBatch:
         off = motion.pose[0] - pose
         off[:, 2] -= 2.0 * math.pi * np.round(off[:, 2] / (2.0 * math.pi))
         aim = pid.aim(off, pose[:, 2], twist, motion.velocity)
-        raised_sum = self._sum + off * dt
+        place, turn = pid.farthest
+        place, turn = place / np.maximum(place, np.sum(off[:, :2] ** 2, axis=1)), turn / np.maximum(turn, off[:, 2] ** 2)
+        raised_sum = summed_each(self._sum, off * dt, np.stack([place, place, turn], axis=1))
         raised, kept = pid.effort(aim, raised_sum), pid.effort(aim, self._sum)
         met = np.logical_or(*volts.beyond(raised))[:, None]
         self._sum = np.where(met, self._sum, raised_sum)
         return np.clip(np.where(met, kept.voltage, raised.voltage), -volts.limit, volts.limit)
+
+
+def summed_each(totals: FloatArray, more: FloatArray, weights: FloatArray) -> FloatArray:
+    """`summed` of many."""
+    lowered = totals + more
+    beyond = (weights < 1.0) & (lowered * totals < 0.0)
+    return np.where(more * totals >= 0.0, totals + weights * more, np.where(beyond, 0.0, lowered))

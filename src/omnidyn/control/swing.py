@@ -36,13 +36,13 @@ def swings(memory, least, t, first, second, third):
 
 
 class Swing:
-    """That of one controller of a robot, with steps of dt [s]."""
+    """That of one controller of a robot, with steps of dt [s]. least: errors that count [m/s, m/s, rad/s]."""
 
     def __init__(self, robot: Robot, dt: float) -> None:
         counts = robot.sensor_model.encoder_counts
         tick = 0.0 if counts is None else 2.0 * math.pi * float(np.max(robot.wheels.radii)) / counts / dt
         radius = float(np.min(robot.wheels.robot_radius))
-        self._least = np.maximum(LEAST * top_speeds(robot), LEAST_TICKS * tick * np.array([1.0, 1.0, 1.0 / radius]))
+        self.least = np.maximum(LEAST * top_speeds(robot), LEAST_TICKS * tick * np.array([1.0, 1.0, 1.0 / radius]))
         self._memory, self._swings = np.zeros((3, 1 + CHANGES)), swings
         self.reset()
 
@@ -53,7 +53,7 @@ class Swing:
 
     def found(self, t: float, first: float, second: float, third: float) -> bool:
         """Whether the loop swings, from an error of the twist [m/s, m/s, rad/s] at t [s]."""
-        arguments = self._memory, self._least, t, first, second, third
+        arguments = self._memory, self.least, t, first, second, third
         if self._swings is swings:
             self._swings = machine_code(swings, *arguments)
         return self._swings(*arguments)

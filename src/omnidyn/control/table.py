@@ -86,7 +86,8 @@ class FeedforwardTable(Displayable):
         if len(self.directions):
             sign_rows = [("along", *(f"kS {k + 1}" for k in range(len(self.speed))))]
             sign_rows += [
-                (_way(way), *(f"{value:.5g}" for value in self.sign[0, :, e])) for e, way in enumerate(self.directions)
+                (_way(direction), *(f"{value:.5g}" for value in self.sign[0, :, e]))
+                for e, direction in enumerate(self.directions)
             ]
             parts += [
                 "volts against dry friction, times the sign of the speed along",
@@ -115,8 +116,8 @@ class FeedforwardTable(Displayable):
         if off:
             c, d = (self.turning * self.centre).tolist()
             lines += [f"fx -= {_c(c)}*w*w; fy -= {_c(d)}*w*w; ft = w*({_sum(np.array([c, d]), ('vx', 'vy'))});"]
-        for e, way in enumerate(self.directions):
-            lines.append(f"s{e} = sgn({_sum(way, ('vx', 'vy', 'w'))});")
+        for e, direction in enumerate(self.directions):
+            lines.append(f"s{e} = sgn({_sum(direction, ('vx', 'vy', 'w'))});")
         for k in range(len(self.speed)):
             terms = [_sum(self.speed[k], ("vx", "vy", "w")), _sum(self.change[k], ("ax", "ay", "aw"))]
             terms += [self._sign_term(k, e) for e in range(len(self.directions))]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -24,12 +24,14 @@ MICRO = 1e6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Tracking(Displayable):
-    """What a closed loop did.
+    """What a closed loop did: a sequence of itself and of others on the same path, in the order of the call.
 
     controller, plant, path: their names. run: what the robot did. wanted: poses of the path at the times of the run,
     shape (samples, 3). skip [s]: errors before it count for nothing. dt [s]: between two steps.
     saturated_share: of the steps, those with an output at its limit. step_times [s]: of the controller, shape (steps,).
     statuses: word of `info.status` other than "ok" -> number of steps. sensors: with which the robot was measured.
+    others: of the other controllers; numbers are those of this one, `best` is the nearest of all, and summary, document
+    and plot are of all of them, side by side.
     """
 
     controller: str
@@ -43,9 +45,30 @@ class Tracking(Displayable):
     step_times: FloatArray
     statuses: Mapping[str, int] = field(default_factory=dict)
     sensors: str = ""
+    others: tuple[Tracking, ...] = ()
 
     def __repr__(self) -> str:
+        if self.others:
+            return f"<Tracking of {self.path} by {', '.join(tracking.controller for tracking in self)}>"
         return f"<Tracking of {self.path} by {self.controller}: rmse {self.rmse_position:.3g} m>"
+
+    @cached_property
+    def _all(self) -> tuple[Tracking, ...]:
+        return (replace(self, others=()), *self.others) if self.others else (self,)
+
+    def __iter__(self) -> Iterator[Tracking]:
+        return iter(self._all)
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def __getitem__(self, index: int) -> Tracking:
+        return self._all[index]
+
+    @property
+    def best(self) -> Tracking:
+        """The one whose position is nearest to the path."""
+        return min(self, key=lambda tracking: tracking.rmse_position)
 
     @cached_property
     def error(self) -> FloatArray:
@@ -117,8 +140,8 @@ class Tracking(Displayable):
         return self.document().to_text()
 
     def document(self) -> Document:
-        """What it says."""
-        return trackings_document([self])
+        """What it says; of several controllers, side by side."""
+        return trackings_document([*self])
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -133,42 +156,6 @@ class Tracking(Displayable):
             "restlessness_V": self.restlessness,
             "statuses": dict(self.statuses),
         }
-
-    def plot(self) -> Figure:
-        """Path and robot from above, error over time, voltages, as a matplotlib Figure."""
-        return make(FIGURE, self)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Trackings(Displayable):
-    """What several controllers did on one path, in the order of the call: a sequence of Tracking."""
-
-    trackings: tuple[Tracking, ...]
-
-    def __iter__(self) -> Iterator[Tracking]:
-        return iter(self.trackings)
-
-    def __len__(self) -> int:
-        return len(self.trackings)
-
-    def __getitem__(self, index: int) -> Tracking:
-        return self.trackings[index]
-
-    def __repr__(self) -> str:
-        return f"<Trackings of {self[0].path} by {', '.join(tracking.controller for tracking in self)}>"
-
-    @property
-    def best(self) -> Tracking:
-        """The one whose position is nearest to the path."""
-        return min(self, key=lambda tracking: tracking.rmse_position)
-
-    def summary(self) -> str:
-        """The result as text."""
-        return self.document().to_text()
-
-    def document(self) -> Document:
-        """What they say, side by side."""
-        return trackings_document(self.trackings)
 
     def plot(self) -> Figure:
         """Path and robot from above, error over time, voltages, as a matplotlib Figure."""

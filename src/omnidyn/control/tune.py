@@ -19,30 +19,28 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.arrays import FloatArray
-from omnidyn.control.closed_loop import Circumstances, Push, told_of_loop, tracked
+from omnidyn.control.closed_loop import Circumstances, circumstances, told_of_loop, tracked
 from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
 from omnidyn.control.demand import path_demand
-from omnidyn.control.feedforward import DT
-from omnidyn.control.instruments import Instruments, instruments, told
+from omnidyn.control.instruments import instruments
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import is_several
 from omnidyn.control.paths.path import path as path_named
+from omnidyn.control.pushes import PUSHED, push_force, pushes
+from omnidyn.control.readings import with_sensors
 from omnidyn.control.tracking import Tracking
 from omnidyn.document import Document, Part, Points, Table, all_of, plain
 from omnidyn.errors import InputError
-from omnidyn.model.drive import SPEED
-from omnidyn.model.inverse import inverse
 from omnidyn.model.known.told import told as known_errors
 from omnidyn.model.known.uncertainty import plausible
-from omnidyn.model.log_effects import Sensors
 from omnidyn.model.robot import Robot
 from omnidyn.model.value import PerWheel
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.shown import Displayable
 from omnidyn.statement import NOTE, Statement, as_verdict
 
+LOOP = ("dt", "duration", "noise", "delay", "rng", "sensors")  # options of the loop
 DRAWS, EVALUATIONS, NOISE = 3, 30, 0.005
 MOST_DRAWS, MOST_EVALUATIONS = 1000, 10_000
 FACTORS, FARTHEST = (4.0, 2.0), 16.0  # by which a setting is changed, round by round; and from the start at the most
@@ -213,13 +211,8 @@ def tune(
     *,
     draws: int = DRAWS,
     evaluations: int = EVALUATIONS,
-    noise: float = NOISE,
-    delay: int = 0,
-    dt: float = DT,
-    duration: float | None = None,
-    seed: int = 0,
-    sensors: str | Instruments | Sensors | None = None,
     progress: Progress = silent,
+    **options: Any,
 ) -> Tuned:
     """Find the settings of a controller by simulation, over the robots that the file says may be meant.
 
@@ -233,25 +226,28 @@ def tune(
         controller: A name or a controller file: its options are where the search begins.
         draws: Robots that are driven.
         evaluations: Settings that are tried, at the most.
-        noise: As for `track` [m/s]; noise 0 and no delay make gains as large as dt allows.
-        delay: As for `track`.
-        dt: As for `track` [s].
-        duration: As for `track` [s].
-        seed: As for `track`; of the draws and pushes too.
-        sensors: As for `track`.
         progress: Hears what is being driven.
+        options: Of the loop, by name, as for `track`: dt=0.02, duration, noise=0.005, delay=0, sensors, and rng=0, that
+            of the draws and pushes too. Noise 0 and no delay make gains as large as dt allows.
 
     Raises InputError for a controller without gains, or a number out of range.
+
+    >>> import omnidyn
+    >>> tuned = omnidyn.tune(omnidyn.load_robot("axebot"), "circle", "speed", draws=1, evaluations=2, duration=0.5)
+    >>> omnidyn.track(omnidyn.load_robot("axebot"), "circle", tuned.controller, duration=0.5).controller
+    'speed'
     """
     paths: list[Any] = [] if path is None else list(path) if is_several(path) else [path]
     kinds = (Path, str) if isinstance(path, Robot) else object
     check_order("tune(robot, path, controller)", (robot, Robot), (paths, kinds), (controller, str))
     _check_counts(draws, evaluations, path is None or paths)
-    kit, robot = instruments(sensors, robot), told(robot, sensors)
-    seconds = SECONDS if path is None and duration is None else duration
-    around = Circumstances(dt, seconds, min(SKIP, 0.5 * (seconds or SECONDS)), noise, delay, seed, sensors=kit)
+    seconds = options.get("duration", SECONDS if path is None else None)
+    around = circumstances(robot, LOOP, **{"noise": NOISE, **options, "duration": seconds})
+    around = replace(around, skip=min(SKIP, 0.5 * (seconds or SECONDS)))
+    kit, seed = around.sensors or instruments(None, robot), around.seed
+    robot = with_sensors(robot, options.get("sensors"))
     spec = controller_spec(controller)
-    start = _start(spec, robot, dt)
+    start = _start(spec, robot, around.dt)
     follow, judged = [[path_named(item) for item in paths]] * 2 if paths else _paths(robot)
     uncertain = bool(known_errors(robot).keys)
     training, held_out = (
@@ -291,9 +287,9 @@ def tune(
         draws,
         uncertain,
         count,
-        noise,
-        delay,
-        dt,
+        around.noise,
+        around.delay,
+        around.dt,
         str(kit),
     )
 
@@ -412,7 +408,7 @@ def _score(
 ) -> TuningScore:
     """What a controller for one robot comes to when it drives the others, free and pushed."""
     control = spec.make(robot, **told_of_loop(robot, around))
-    force = _force(robot)
+    force = push_force(robot)
     rows: list[list[Tracking]] = []
     weights: list[float] = []
     for path in paths:
@@ -421,7 +417,7 @@ def _score(
             weights.append(PUSHED if pushed else 1.0)
             for k, plant in enumerate(plants):
                 seed = [around.seed, k, len(rows)]
-                push = _pushes(force, around.duration or path.duration, np.random.default_rng(seed)) if pushed else None
+                push = pushes(force, around.duration or path.duration, np.random.default_rng(seed)) if pushed else None
                 number = int(np.random.default_rng(seed).integers(2**31))
                 under = replace(around, seed=number, **({} if push is None else {"push": push}))
                 row.append(tracked(plant, path, control, under))
@@ -442,37 +438,3 @@ def _score(
 def _squares(tracking: Tracking) -> tuple[float, float]:
     """Squared errors of a run: of the position [m^2], of the heading [rad^2]."""
     return tracking.rmse_position**2, tracking.rmse_heading**2
-
-
-# Pushes that nobody announces: a knock, then a long one, each from another side
-
-PUSH_EVERY, KNOCK, KNOCK_FORCE, LONG, LONG_FORCE = 2.0, 0.15, 3.0, 1.2, 0.8  # [s], [s], of dry friction, [s], of it
-PUSHED = 0.5  # weight of a run that is pushed, beside one that is not
-LEAST_PUSH = 0.5  # [m/s^2], [rad/s^2]: where little rubs
-
-
-def _force(robot: Robot) -> FloatArray:
-    """What pushes are measured by: the dry friction of each axis [N, N, N m]; zeros where none can be simulated."""
-    if robot.wheels.traction_mu is not None and robot.drive.kind == SPEED:
-        return np.zeros(3)
-    model = inverse(robot)
-    sliding = -model.friction(np.eye(3), np.zeros((3, 3)))[range(3), range(3)]
-    viscous = (model.levels.directions**2).T @ model.levels.viscous
-    return np.maximum(sliding - viscous, LEAST_PUSH * np.diag(model.mass))
-
-
-def _pushes(force: FloatArray, duration: float, random: np.random.Generator) -> Callable[[float], Push]:
-    """The wrench at a time [s] of a run."""
-    count = math.ceil(duration / PUSH_EVERY) + 1
-    sides = random.uniform(-1.0, 1.0, (count, 3)) * force
-    starts = PUSH_EVERY * np.arange(count) + random.uniform(0.2, PUSH_EVERY - LONG, count)
-
-    def push(t: float) -> Push:
-        k = min(max(int(t / PUSH_EVERY), 0), count - 1)
-        length, share = (KNOCK, KNOCK_FORCE) if k % 2 == 0 else (LONG, LONG_FORCE)
-        if not starts[k] <= t < starts[k] + length:
-            return (0.0, 0.0, 0.0)
-        x, y, turn = (share * sides[k]).tolist()
-        return (x, y, turn)
-
-    return push

@@ -325,7 +325,6 @@ CONTROLLERS: dict[str, Cell] = {
     "pid": Cell(SAYS),
     "speed": Cell(SAYS),
     "mpc": Cell(SAYS),
-    "araujo": Cell(REFUSES, "it is there for comparison alone: its cones take a solver"),
 }
 
 

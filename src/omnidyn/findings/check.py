@@ -74,9 +74,9 @@ OF_EXCITATION = ("not_excited", "one_way", "one_speed")
 def check(log: Log | Run, robot: Robot | None = None) -> Verdict:
     """Everything that a log shows about itself, and, with a robot, about how the two fit together.
 
-    log: as `load_log` reads it, or a Run in memory: then rows are its samples, counted from 0, and faults of its time
-    base are gone, for a Run has none. The verdict has errors where the log gives wrong results as it stands; it says
-    what the log can be used for, and keeps it, to be drawn by its `plot()`.
+    log: as `read_log(path, recorded=True)` reads it, or a Run in memory: then rows are its samples, counted from 0, and
+    faults of its time base are gone, for a Run has none. The verdict has errors where the log gives wrong results as it
+    stands; it says what the log can be used for, and keeps it, to be drawn by its `plot()`.
     Never raises for what the log holds; InputError for what is neither, or where log and robot are swapped.
 
     >>> import omnidyn

@@ -66,14 +66,19 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[Statement]:
     )
     remedy = next(near_causes, None)
     if remedy is not None:
-        numbers = {"cause": remedy.cause, "same_as": remedy.same_as, "alike": lack.alike(remedy), "way": way(remedy)}
+        numbers = {
+            "cause": remedy.cause,
+            "same_as": remedy.same_as,
+            "alike": lack.alike(remedy),
+            "way": next_action(remedy),
+        }
         yield Statement("missing_cause", NOTE, remedy.key, numbers | remedy.largest_changes())
     best = next(iter(lack.causes), None)
     if fit.ladder is None and (best is None or (best.offered and best.key != CHANGE)):
         yield Statement("try_ladder", NOTE)
 
 
-def way(remedy: Remedy) -> str:
+def next_action(remedy: Remedy) -> str:
     """What to do about a remedy: "distinguish" it from others, "fit" a nuisance, "look", "limit", "measure", "put"."""
     if remedy.same_as:
         return "distinguish"

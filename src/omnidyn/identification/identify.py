@@ -75,8 +75,8 @@ def identify(
     The result has what an Estimate has: robot, value, std, ci95, correlation, warnings, lack_of_fit, ...
 
     Args:
-        logs: one or several, of `read_log` or `load_log`; the latter are checked as well. Or a table of steady points,
-            `read_steady_table`, or of motors.
+        logs: one or several of `read_log`; those read with `recorded=True` are checked as well. Or a table of steady
+            points, `read_steady_table`, or of motors.
         robot: where the fit starts; what is not fitted is taken as it is. Motors need none.
         method: `OutputError`, `SteadyState`, `MotorLine` or `MotorFit`, with their options. None: output error where
             robot and logs support it, else steady state; a note says why. The line of motors for a table of motors.

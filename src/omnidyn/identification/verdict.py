@@ -48,7 +48,8 @@ def fits_verdict(
     statements += [fit.ladder.statement() for fit in [*fits.values()][:1] if fit.ladder]  # all have the same
     for group, fit in fits.items():
         lack = fit.lack_of_fit.statement() if fit.lack_of_fit is not None and not fit.not_followed else None
-        group_statements = [*([lack] if lack else []), fit_verdict(fit, validations.get(group))]
+        outcome = fit_verdict(fit, validations.get(group))
+        group_statements = [lack, outcome] if lack and lack.severity != NOTE else [outcome, *([lack] if lack else [])]
         statements += (
             group_statements if len(fits) == 1 else [of_group(group, statement) for statement in group_statements]
         )

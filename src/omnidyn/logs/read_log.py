@@ -6,7 +6,7 @@ import difflib
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 
@@ -78,10 +78,19 @@ class LogOptions:
         }
 
 
+@overload
 def read_log(
+    path: str | os.PathLike, robot: Robot | None = None, *, recorded: Literal[True], **options: Any
+) -> Log: ...
+@overload
+def read_log(
+    path: str | os.PathLike, robot: Robot | None = None, *, recorded: Literal[False] = False, **options: Any
+) -> Run: ...
+def read_log(  # pyright: ignore[reportInconsistentOverload]  it has the options by name
     path: str | os.PathLike,
     robot: Robot | None = None,
     *,
+    recorded: bool = False,
     columns: ColumnMap | str | os.PathLike | Mapping[str, str] | None = None,
     assume: Mapping[str, str] | None = None,
     latency: Mapping[str, float] | None = None,
@@ -93,14 +102,16 @@ def read_log(
     variables: Sequence[str] = (),
     beside: Sequence[str | os.PathLike] = (),
     rate: float | None = None,
-) -> Run:
-    """Read a log as a Run, to fit, simulate and compare with; `load_log` reads it as recorded, faults and all.
+) -> Run | Log:
+    """Read a log as a Run, to fit, simulate and compare with; or as recorded, faults and all, for `check`.
 
     Columns are guessed from names and units, and what was guessed stands in the warnings of the Run.
 
     Args:
         path: The file, or the folder of a bag.
         robot: Settles what names leave open, and is needed for speeds of the motor shaft.
+        recorded: Whether to return the Log, in SI and by channel: its time may repeat, go back or be missing, and
+            `to_run` makes the Run of it.
         columns: A ColumnMap, the path of one (TOML), or overrides such as {"u1": "motor_1_volts:V"}.
         assume: Unit by column or letter of a component, where the file gives none, such as {"d": "duty/255"}.
         latency: How late components were recorded, by their letter [s].
@@ -114,6 +125,15 @@ def read_log(
         rate: Rows per second [1/s] of a file that has no time.
 
     Raises InputError for what cannot be read or is doubtful, with file, line and remedy.
+
+    >>> import pathlib, tempfile
+    >>> import omnidyn
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder, "log.csv")
+    ...     _ = file.write_text("t_s,u1_V,u2_V,u3_V,vx_m_s\\n0.00,0,3,-3,0.00\\n0.02,0,3,-3,0.06\\n0.04,0,3,-3,0.12\\n")
+    ...     run = omnidyn.read_log(file, omnidyn.load_robot("axebot"))
+    >>> run.voltage.shape, run.twist[:, 0].tolist()
+    ((3, 3), [0.0, 0.06, 0.12])
     """
     column_map = columns if isinstance(columns, ColumnMap) else None
     overrides: tuple[str, ...] = ()
@@ -134,13 +154,15 @@ def read_log(
         tuple(str(file) for file in beside),
         rate,
     )
-    log = load_log(path, robot, options)
+    log = recorded_log(path, robot, options)
+    if recorded:
+        return log
     run = log.to_run(sort=sort)
     return run.replace(warnings=(*run.warnings, *log.columns.doubts))
 
 
-def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None) -> Log:
-    """Read a log as recorded, faults and all, which is what `check` needs; `read_log` makes a Run of it, to work with.
+def recorded_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None) -> Log:
+    """A log as recorded, faults and all, which is what `check` needs; `read_log` makes a Run of it, to work with.
 
     In SI and by channel; its time may repeat, go back or be missing. Raises InputError.
     """

@@ -11,13 +11,14 @@ from omnidyn.campaigns.results import Campaign
 from omnidyn.comparison.drift import Drift
 from omnidyn.comparison.model_bands import with_fitted_band
 from omnidyn.comparison.result import Comparison
-from omnidyn.control.tracking import Tracking, Trackings
+from omnidyn.control.tracking import Tracking
 from omnidyn.errors import InputError
 from omnidyn.findings.finding import Verdict
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.friction_curve import FrictionCurve, sliding_force
 from omnidyn.identification.identification import Identification
 from omnidyn.identification.motors.study import MotorStudy
+from omnidyn.identification.planning.plan import Plan
 from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.logs.path import path_of
 from omnidyn.model.frames import AXES
@@ -31,6 +32,7 @@ from omnidyn.report.figures.friction_speed import ONLY_GROUP, draw_estimates, dr
 from omnidyn.report.figures.motor_lines import draw_motor_lines
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
+from omnidyn.report.figures.plan import draw_plan
 from omnidyn.report.figures.raw_log import draw_raw_log
 from omnidyn.report.figures.robot import draw_robot
 from omnidyn.report.figures.shapes import draw_polar
@@ -117,6 +119,6 @@ PICTURES: dict[type, Callable[..., Picture]] = {
     MotorStudy: _motors,
     SteadyStudy: draw_polar,
     Tracking: draw_tracking,
-    Trackings: draw_tracking,
     Campaign: draw_campaign,
+    Plan: draw_plan,
 }

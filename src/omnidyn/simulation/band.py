@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
-from omnidyn.arguments import check_order
+from omnidyn.arguments import Rng, check_order, seed_of
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import one_by_one
 from omnidyn.model.known.uncertainty import DRAWS, QuantileTails, first_order_std, plausible
@@ -39,7 +39,7 @@ def confidence_band(
     dt: ArrayLike | None = None,
     *,
     draws: int = DRAWS,
-    seed: int = 0,
+    rng: Rng = 0,
     **options: Any,
 ) -> Band:
     """The band of `simulate(robot, voltage, dt, **options)`: the same run by so many plausible robots.
@@ -49,13 +49,20 @@ def confidence_band(
         voltage: As in `simulate` [V], shape (n, wheels).
         dt: Length of the rows [s], a number or shape (n,).
         draws: Number of plausible robots.
-        seed: Of the draws.
+        rng: A seed or a numpy.random.Generator of the draws.
         options: Other arguments of `simulate`.
 
     Raises InsufficientDataError where no number of the robot has a std, and what `simulate` raises.
+
+    >>> import omnidyn
+    >>> from omnidyn.model.robot import Prior
+    >>> robot = omnidyn.load_robot("axebot").replace(priors={"motor.resistance_ohm": Prior(std=0.05)})
+    >>> band = omnidyn.confidence_band(robot, [[0.0, 3.0, -3.0]] * 50, dt=0.02, draws=20)
+    >>> bool(band.low.twist[-1, 0] < band.high.twist[-1, 0])
+    True
     """
     check_order("confidence_band(robot, voltage, dt)", (robot, Robot), (voltage, object))
-    return band_of(plausible(robot, draws, seed), lambda candidate: simulate(candidate, voltage, dt, **options))
+    return band_of(plausible(robot, draws, seed_of(rng)), lambda candidate: simulate(candidate, voltage, dt, **options))
 
 
 def band_of(robots: Sequence[Robot], run_of: Callable[[Robot], Run]) -> Band:

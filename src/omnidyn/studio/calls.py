@@ -71,7 +71,11 @@ class LogFile:
 
     def python(self, robot: str = "") -> str:
         """How Python reads it so, faults and all where it is read as it stands. robot: a variable, "" for none."""
-        return self.run_python(robot) if self.flags else f"omnidyn.load_log({self.name!r}{robot and f', {robot}'})"
+        return (
+            self.run_python(robot)
+            if self.flags
+            else f"omnidyn.read_log({self.name!r}{robot and f', {robot}'}, recorded=True)"
+        )
 
     def run_python(self, robot: str = "") -> str:
         """How Python makes a Run of it. robot: a variable, "" for none."""

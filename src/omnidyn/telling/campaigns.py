@@ -30,6 +30,12 @@ def _failed(statement: Statement) -> str:
     return f"{_of(statement)} has {failed}; {done} of {numbers['shards']} are there"
 
 
+def _fits_failed(statement: Statement) -> str:
+    """All fits of a campaign are there, and some do not stand."""
+    n = statement.numbers
+    return f"{_of(statement)} is complete: {n['failed']} of {counted(n['samples'], 'fit')} do not stand"
+
+
 def _tolerance(statement: Statement) -> str:
     """The largest box of the variables within which every sample keeps the limit."""
     n = statement.numbers
@@ -44,6 +50,8 @@ SENTENCES = {
     "campaign_done": Sentence(_done),
     "campaign_open": Sentence(_open, "go on with omnidyn sweep resume"),
     "campaign_failed": Sentence(_failed, "read their tracebacks, then omnidyn sweep resume runs them again"),
+    "fits_failed": Sentence(_fits_failed, "read the columns `verdict` and `words` of the table"),
+    "fit_of_part": Sentence("{subject} is not whole, and the fit is of what is there: {why}", "copy the log again"),
     "shard_failed": Sentence("{subject}: {error}"),
     "log_not_read": Sentence("{subject} cannot be read: {error}"),
     "log_not_fitted": Sentence("{subject} cannot be fitted: {error}"),

@@ -85,8 +85,8 @@ REASONS = {
     "turns_in_degrees": Reason(
         either(
             "unit",
-            "it jumps by 360 as degrees do, not radians",
-            "no unit is given, and it jumps by 360 as degrees do",
+            "it jumps as degrees do, not radians",
+            "no unit is given, and it jumps as degrees do",
         )
     ),
     "beyond_range": Reason(_beyond_range),
@@ -222,6 +222,7 @@ SENTENCES = {
     "current_sign_taken": Sentence(
         "currents are taken as unsigned: they get the sign of the {origin}, and 0 where that is 0"
     ),
+    "file_cut_short": Sentence("{text}"),
     "rows_joined": Sentence("{joined} of {rows} rows fill the blanks of a row of the same time: joined to it"),
     "rows_empty": Sentence("{left_out} of {rows} rows hold no time or no number: left out, first in line {first}"),
     "rows_of_padding": Sentence(

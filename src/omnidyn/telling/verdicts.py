@@ -26,6 +26,29 @@ def _numbers_known(statement: Statement) -> str:
     return f"{words}; not known: {names_of(missing)}" if missing else words
 
 
+def _planned(statement: Statement) -> str:
+    """ "60 s of driving tell 5 of 6 numbers of axebot, the widest (viscous friction forward) within 2.5 %" """
+    numbers = statement.numbers
+    count, missing, widest = numbers["count"], numbers["missing"], numbers["widest"]
+    begin = f"{numbers['seconds']:.3g} s of driving tell"
+    if len(missing) == count:
+        return f"{begin} no number of {statement.subject}: not {names_of(missing)}"
+    shown = f"{count - len(missing)} of {count} numbers" if missing else f"all {count} numbers"
+    words = f"{begin} {shown} of {statement.subject}, the widest ({in_words(widest)}) within "
+    words += f"{short(max(0.1, 100.0 * numbers['share']))} %"
+    return f"{words}; not {names_of(missing)}" if missing else words
+
+
+def _inside(statement: Statement) -> str:
+    """How far a plan goes in its room."""
+    (x, y), (width, depth) = statement.numbers["reach"], statement.numbers["area"]
+    return (
+        f"begin in the middle of {width:.3g} m x {depth:.3g} m, along its first side: {statement.numbers['robots']} "
+        f"robots that may be meant went up to {x:.2g} m along it and {y:.2g} m to the side; stop it by hand if it "
+        "comes near the border"
+    )
+
+
 def _predicted(held_out: Statement | None) -> str:
     """How near noise the errors on logs held out are; "" where none was, or nothing is sure."""
     if held_out is None or held_out.code == "held_out_colour":
@@ -114,6 +137,12 @@ def _of_groups(statement: Statement) -> str:
 
 
 SENTENCES = {
+    "planned": Sentence(_planned),
+    "plan_stays_inside": Sentence(_inside),
+    "plan_begins": Sentence(
+        "drive both programs from rest, log them apart, and give the second, of {held_out:.3g} s, to identify as "
+        "`hold_out`"
+    ),
     "numbers_known": Sentence(_numbers_known),
     "model_outcome": Sentence(_outcome),
     "not_compared": Sentence("{known}; no log was compared with the model"),

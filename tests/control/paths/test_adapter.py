@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.control.controllers import NAMES, UNLISTED_NAMES, controller_named
+from omnidyn.control.controllers import NAMES, controller_named
 from omnidyn.control.paths.adapter import as_path
 from omnidyn.control.paths.path import is_several
 from omnidyn.errors import InputError
@@ -66,11 +66,9 @@ def test_it_is_where_the_named_path_is(what):
     np.testing.assert_allclose(path.twist_at(2.0)[2], NAMED.twist_at(2.0)[2], atol=1e-8)
 
 
-@pytest.mark.parametrize("name", [*NAMES, "araujo"])  # a policy has paths of its own: tests/control/test_policy.py
+@pytest.mark.parametrize("name", NAMES)  # a policy has paths of its own: tests/control/test_policy.py
 def test_every_controller_takes_them_as_they_are(name):
     """Step by step, without a call of `path` before: the outputs are those of the named path."""
-    if name in UNLISTED_NAMES:
-        pytest.importorskip("clarabel")
     for own in (Plain(), OneByOne()):
         first, other = (controller_named(name, ROBOT) for _ in range(2))
         for k in range(8):

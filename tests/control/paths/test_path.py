@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.control.paths.curve import lines, through
+from omnidyn.control.paths.polyline import lines, through
 from omnidyn.errors import InputError
 from omnidyn.run import Run
 

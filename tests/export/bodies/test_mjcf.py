@@ -7,6 +7,7 @@ import omnidyn
 from omnidyn.errors import InputError
 from omnidyn.export.bodies.mjcf import mjcf
 from omnidyn.model.actuation import clip_voltage
+from omnidyn.model.deadzone import breakaway_voltage
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.friction import Friction
 from omnidyn.model.mass import per_mass
@@ -76,7 +77,7 @@ def test_inertias_are_those_of_a_body():
 
 @pytest.mark.parametrize("pattern", [[0.0, 1.0, -1.0], [-1.0, 0.5, 0.5], [1.0, 1.0, 1.0]])
 def test_within_its_dead_zone_it_drifts_less_than_a_tenth_of_a_millimetre_in_a_minute(pattern):
-    volts = 0.5 * omnidyn.breakaway_voltage(ROBOT, pattern) * np.array(pattern)
+    volts = 0.5 * breakaway_voltage(ROBOT, pattern) * np.array(pattern)
     _, places = simulated(ROBOT, np.tile(volts, (6_000, 1)))
     assert 10.0 * np.abs(places[-1]).max() < 1e-4  # steady creep: six seconds tell of sixty
 
@@ -159,7 +160,7 @@ def test_a_robot_that_drives_and_turns_takes_its_friction_along(robot):
 def test_within_its_dead_zone_it_rests_at_any_heading():
     model, data = loaded(TURNING)
     data.qpos[2] = 0.7
-    data.ctrl[:] = 0.5 * omnidyn.breakaway_voltage(TURNING, [0.0, 1.0, -1.0]) * np.array([0.0, 1.0, -1.0])
+    data.ctrl[:] = 0.5 * breakaway_voltage(TURNING, [0.0, 1.0, -1.0]) * np.array([0.0, 1.0, -1.0])
     mujoco.mj_step(model, data, 6000)
     assert 10.0 * np.abs(data.qpos[:2]).max() < 1e-4  # as above
 

@@ -9,6 +9,7 @@ import pytest
 import omnidyn
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.code.c_model import c_model
+from omnidyn.model.deadzone import breakaway_voltage
 from tests.support.exported import STRICT, Stepper, exact_robot, init_robot, program
 from tests.support.friction_shapes import implicit
 from tests.support.mixed_robots import random_robot, with_band, with_bristles, with_stribeck
@@ -43,7 +44,7 @@ def test_single_precision_follows(seed, tmp_path):
 @pytest.mark.parametrize("electrical", ["quasi-static", "dynamic"])
 def test_at_rest_in_its_dead_zone_for_a_minute_it_is_exactly_at_rest(precision, electrical, tmp_path):
     robot = ROBOT.replace(motor=ROBOT.motor.replace(electrical=electrical))
-    volts = np.tile([0.0, 0.5, -0.5], (6000, 1)) * omnidyn.breakaway_voltage(robot, [0.0, 1.0, -1.0])
+    volts = np.tile([0.0, 0.5, -0.5], (6000, 1)) * breakaway_voltage(robot, [0.0, 1.0, -1.0])
     twist, pose = Stepper(robot, tmp_path / "c", precision).run(volts, 1e-2)
     assert not twist.any()
     assert not pose.any()

@@ -10,6 +10,7 @@ import pytest
 import omnidyn
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.code.fmu import OUTPUTS, fmu
+from omnidyn.model.deadzone import breakaway_voltage
 from tests.support.exported import exact_robot, init_robot, program
 from tests.support.friction_shapes import implicit
 
@@ -56,7 +57,7 @@ def test_it_is_the_engine(name, tmp_path):
 
 
 def test_at_rest_for_a_minute_it_is_exactly_at_rest(tmp_path):
-    volts = np.tile([0.0, 0.5, -0.5], (960, 1)) * omnidyn.breakaway_voltage(ROBOT, [0.0, 1.0, -1.0])
+    volts = np.tile([0.0, 0.5, -0.5], (960, 1)) * breakaway_voltage(ROBOT, [0.0, 1.0, -1.0])
     assert not simulated("axebot", tmp_path, volts, 2.0**-4).any()
 
 

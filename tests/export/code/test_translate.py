@@ -130,7 +130,7 @@ def test_each_construct_computes_what_python_does(tmp_path):
         pytest.skip("no gcc here")
     dtype = np.dtype([("level", "f8"), ("push", "f8", (3,)), ("active", "f8"), ("depth", "f8")])
     bodies = np.array([(3.0, (1.0, 2.0, 4.0), 1.0, 0.5), (0.0, (0.0, 0.0, 0.0), 1.0, -0.5)], dtype).view(np.recarray)
-    record, program = record_type("Body", dtype), CProgram(known={("Body", "active"): 1.0})
+    record, program = record_type("Body", dtype), CProgram(fixed_fields={("Body", "active"): 1.0})
     kinds = {nested: (REAL,), sliced: (Array((4,)),), counted: (INT,), pulled: (record, Array((2,), record))}
     for function, arguments in kinds.items():
         (tree,) = ast.parse(inspect.getsource(function)).body
@@ -165,4 +165,6 @@ def test_a_loop_without_end_gives_no_number():
 def test_what_is_known_may_not_be_changed():
     record = record_type("Body", np.dtype([("active", "f8")]))
     with pytest.raises(TranslationError, match=r"body\.active is not constant"):
-        CProgram(known={("Body", "active"): 1.0}).function(source("def f(body):\n    body.active = 0.0"), (record,))
+        CProgram(fixed_fields={("Body", "active"): 1.0}).function(
+            source("def f(body):\n    body.active = 0.0"), (record,)
+        )

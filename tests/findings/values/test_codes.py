@@ -7,7 +7,7 @@ from omnidyn.findings.check import check
 from omnidyn.logs.column import Column
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.log import Log
-from omnidyn.logs.read_log import load_log
+from omnidyn.logs.read_log import recorded_log
 from omnidyn.simulation.simulate import simulate
 
 
@@ -131,7 +131,7 @@ def test_a_code_in_some_rows_asks_for_no_other_unit(tmp_path, name, code):
     values[7::37] = code
     table = np.column_stack([t, 5.0 * np.sin(t), values])
     np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=f"t_s,u1_V,{name}", comments="")
-    verdict = check(load_log(tmp_path / "log.csv"))
+    verdict = check(recorded_log(tmp_path / "log.csv"))
     assert not verdict.of("not_taken")
     (finding,) = verdict.of("placeholder")
     assert finding.numbers["cell"] == code

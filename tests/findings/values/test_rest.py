@@ -7,7 +7,7 @@ import pytest
 
 from omnidyn.findings.check import check
 from omnidyn.logs.log import Log
-from omnidyn.logs.read_log import load_log
+from omnidyn.logs.read_log import recorded_log
 from omnidyn.statistics import moving
 from tests.support.cases import case
 
@@ -41,7 +41,7 @@ def test_a_robot_that_is_said_to_drive_on_is():
 
 
 def test_the_residue_of_a_filter_is_not_stuck():
-    verdict = check(load_log(case("logs/still_called_stuck/rest.csv")))
+    verdict = check(recorded_log(case("logs/still_called_stuck/rest.csv")))
     assert not verdict.of("stuck")
     assert not [finding for finding in verdict.findings if finding.severity != "note"]
 

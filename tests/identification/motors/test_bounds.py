@@ -59,8 +59,8 @@ def test_a_motor_that_a_positive_input_turns_backward():
     forward = motor(steps(0.35, 2.0, 2.0, -1.5))
     backward = forward.replace(voltage=-forward.voltage)
     (log,) = motor_logs([backward])
-    assert turned_under([log], 0, way=-1.0) == pytest.approx(1.5)
-    assert turned_under([log], 0, side=1.0, way=-1.0) == pytest.approx(2.0)
+    assert turned_under([log], 0, orientation=-1.0) == pytest.approx(1.5)
+    assert turned_under([log], 0, side=1.0, orientation=-1.0) == pytest.approx(2.0)
     forward, backward = (identify([each], None, MotorLine()).study.starts for each in (forward, backward))
     assert [each.ci95["start"] for each in forward] == [each.ci95["start"] for each in backward]
 

@@ -108,7 +108,7 @@ def test_the_way_chosen_by_logs_left_out_is_the_true_one(clean, band):
     """Held inputs, no latency; a dead band only where there is one. One log is predicted by its parts."""
     for runs in (run_of(clean, band, 2), [run_of(clean, band, seed) for seed in range(2)]):
         chosen = choose_motor(runs)
-        assert chosen.way == {"between": "hold", "latency": False, "dead_band": band > 0.0}
+        assert chosen.options == {"between": "hold", "latency": False, "dead_band": band > 0.0}
         assert len(chosen.errors) == len(WAYS)
         assert min(error for _, error in chosen.errors) == pytest.approx(0.05, rel=0.15)  # the noise
 

@@ -169,3 +169,12 @@ def test_an_axis_in_metres_is_a_motor(tmp_path, names, unit):
     assert motor.value["offset"] == pytest.approx(0.09, rel=0.05)
     assert f"{unit} s/m" in str(study.statements[0])
     assert study.to_dict()["motors"][0]["travel_unit"] == "m"
+
+
+def test_a_line_that_a_free_run_follows_down_to_the_noise_is_no_curve():
+    """Short holds, of which five only are steady: these alone looked bent."""
+    put_in = stairs(276)
+    run = run_of(put_in, axis(put_in, slope=(0.2805, 0.2805), band=0.2593)[1], 276, noise=0.0225)
+    study = study_of(run)
+    assert not study.curves
+    assert study.motors[0].value["dead_band"] == pytest.approx(0.2593, abs=0.004)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.ordinary import counted
-from benchmarks.ordinary_robots import driven, robots
+from benchmarks.identification.ordinary import counted
+from benchmarks.identification.ordinary_robots import driven, robots
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.solve.progress import FitProgress

@@ -148,10 +148,10 @@ def test_a_guess_that_is_held_is_named_where_the_model_misses_something(wrong, r
 def test_half_and_twice_of_a_guess_are_equally_far_from_it():
     """The prior of a number that must be positive is one of its logarithm."""
     p = Parameter(RESISTANCE, 3.0, 1e-3, 1e3, True, (3.0, 3.0))
-    mean, std = p.known
+    mean, std = p.inner_prior
     assert std == 1.0
     assert p.inner(6.0) - mean == pytest.approx(mean - p.inner(1.5))
-    assert Parameter(DIRECTION[0], 3.0, 0.0, 1e3, prior=(3.0, 2.0)).known == (3.0, 2.0)
+    assert Parameter(DIRECTION[0], 3.0, 0.0, 1e3, prior=(3.0, 2.0)).inner_prior == (3.0, 2.0)
 
 
 def test_a_setting_or_a_drawing_is_not_free_by_default(robot):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks import steady_shapes
-from benchmarks.steady_shapes import KINDS, driven
+from benchmarks.identification import steady_shapes
+from benchmarks.identification.steady_shapes import KINDS, driven
 from benchmarks.wrong_worlds.log import truths
 from benchmarks.wrong_worlds.world import ELLIPSE
 from omnidyn.attempts import Attempts

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.blind.log import robot_of
-from benchmarks.floors import driven
+from benchmarks.identification.floors import driven
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE, WHEELS, World
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.identify import identify

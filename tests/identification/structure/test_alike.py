@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.blind.alike import ALIKE, grouped
-from omnidyn.identification.advice import way
+from omnidyn.identification.advice import next_action
 from omnidyn.identification.lack_of_fit import LackOfFit, Remedy
 from omnidyn.statement import quoted
 
@@ -25,4 +25,4 @@ def test_the_group_is_told_with_its_values_and_what_would_decide():
     assert str(lack.statement()).endswith(
         "most likely gain 0.94, or what this log cannot tell from it (wheel radius -3 %, mass)"
     )
-    assert way(group[0]) == "distinguish"
+    assert next_action(group[0]) == "distinguish"

@@ -78,7 +78,7 @@ def log_of(layout, every=False):
 def begun(layout, every=False):
     """A fit that has hardly begun, its workbench, and all that is tried of it."""
     fit = Fit.of([log_of(layout, every)], robot_of(layout, PLACES[layout]), OutputError(nuisances=("latency",)))
-    solver = fit._solver(("latency",))
+    solver = fit.solver(("latency",))
     solution = solver.minimise(solver.problem.start(), limit=0)
     problem, point = solution.solver.problem, solution.state.point
     bench = Workbench(problem, point, type(solver.engine), motions(problem, point), (0.5,))

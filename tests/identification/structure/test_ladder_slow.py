@@ -47,8 +47,8 @@ def test_so_many_fits_with_wheels_that_slip_are_made_and_the_others_named(rolls)
     assert purse.pays(asked[:2], slips) == asked[:2]
     assert purse.pays(asked[2:], slips) == asked[2:FITS]
     assert purse.pays(asked, rolls) == asked  # others are as many as there are
-    assert [(each.move, each.reason) for each in purse.told()] == [(own, SPENT_NOTE) for own in asked[FITS:]]
-    assert purse.told() == []
+    assert [(each.move, each.reason) for each in purse.untried()] == [(own, SPENT_NOTE) for own in asked[FITS:]]
+    assert purse.untried() == []
 
 
 def test_behind_what_leaves_only_noise_rivals_alone_are_tried(rolls):
@@ -56,7 +56,7 @@ def test_behind_what_leaves_only_noise_rivals_alone_are_tried(rolls):
     near, far = move(GRIP, 95.0), move(GRIP, 90.0)
     purse = Purse()
     assert purse.rivals([near, far], best) == [near]
-    assert [(each.move, each.reason) for each in purse.told()] == [(far, NOT_NEEDED_NOTE)]
+    assert [(each.move, each.reason) for each in purse.untried()] == [(far, NOT_NEEDED_NOTE)]
 
 
 def test_a_wrong_mass_under_wild_samples_needs_no_fit_of_wheels_that_slip(monkeypatch):

@@ -6,7 +6,7 @@ Logs of the integrators of tests/reference, which share no code with simulation/
 import numpy as np
 import pytest
 
-from benchmarks.laws_ladder import of_law, right
+from benchmarks.identification.laws_ladder import of_law, right
 from omnidyn.identification.structure.missing.laws import (
     arm,
     bent,

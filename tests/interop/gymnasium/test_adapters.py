@@ -117,7 +117,7 @@ def test_pytorch_shares_memory():
     observation, reward, terminated, truncated, infos = envs.step(np.ones((5, 3), np.float32).view(Tensor))
     assert np.shares_memory(reward, plain.environments.buffers.reward)
     assert terminated.dtype == truncated.dtype == np.bool_
-    assert infos == {}
+    assert {*infos} >= {"reward_velocity", "reward_yaw_rate", "success"}
 
 
 @pytest.mark.usefixtures("libraries")

@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn import check
 from omnidyn.logs.clock.counters import widened
-from omnidyn.logs.read_log import LogOptions, load_log
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from tests.support.cases import case
 from tests.support.counted import bench, wandering, write_columns
 
@@ -47,13 +47,13 @@ def test_a_speed_that_changes_too_fast_to_be_followed_is_named(tmp_path, speeds)
     t, volts, true = speeds
     path = write_columns(tmp_path / "log.csv", "t_s,voltage_V,speed_ticks_s", t, volts, wrapped(true))
     column = ("w1=speed_ticks_s:0.0066666667 rad/s",)
-    (finding,) = check(load_log(path, options=LogOptions(overrides=column))).of("speed_overflow")
+    (finding,) = check(recorded_log(path, options=LogOptions(overrides=column))).of("speed_overflow")
     assert finding.severity == "warning"
     assert "leaves its 16 bits" in str(finding)
     true = true.copy()
     true[3000:3100:2] -= 40_000  # kicks of which nobody can tell whether they go over the end
     path = write_columns(tmp_path / "fast.csv", "t_s,voltage_V,speed_ticks_s", t, volts, wrapped(true))
-    log = load_log(path, options=LogOptions(overrides=column))
+    log = recorded_log(path, options=LogOptions(overrides=column))
     found = check(log).of("speed_overflow")
     assert not found or found[0].severity == "error"
 
@@ -72,6 +72,6 @@ def test_full_speeds_that_reverse_are_left_alone():
 
 def test_the_case_of_a_hub_motor():
     path = case("logs/speed_overflow/wrap16.csv")
-    log = load_log(path, options=LogOptions(overrides=("w1=velocity_ticks_s:0.0066666667 rad/s",)))
+    log = recorded_log(path, options=LogOptions(overrides=("w1=velocity_ticks_s:0.0066666667 rad/s",)))
     assert float(np.nanmax(log.channels["wheel_speed"])) == pytest.approx((6.0 - 0.35) / 0.02, rel=0.02)
     assert check(log).of("speed_overflow")[0].severity == "warning"

@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn import read_log
 from omnidyn.errors import InputError
-from omnidyn.logs.read_log import LogOptions, iter_logs, load_log
+from omnidyn.logs.read_log import LogOptions, iter_logs, recorded_log
 from tests.support.codes import said
 
 
@@ -30,7 +30,7 @@ def test_in_pieces_it_goes_on(tmp_path):
 
 
 def test_a_row_that_is_left_out_has_its_time(tmp_path):
-    log = load_log(written(tmp_path, odd=11), options=LogOptions(rate=10.0, skip_bad_rows=True))
+    log = recorded_log(written(tmp_path, odd=11), options=LogOptions(rate=10.0, skip_bad_rows=True))
     assert log.t.tolist() == [k / 10.0 for k in range(40) if k != 11]
 
 
@@ -58,6 +58,6 @@ def test_a_log_with_a_time_takes_no_rate(tmp_path, header):
 def test_a_column_t_that_is_no_time_stays(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("t,w1_rad_s\n" + "\n".join(f"{20 + k % 3},{k}" for k in range(40)))
-    log = load_log(path, options=LogOptions(rate=50.0))
+    log = recorded_log(path, options=LogOptions(rate=50.0))
     assert log.columns.columns["t"].name == "t (rate)"
     assert log.t[-1] == 39.0 / 50.0

@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn import MotorLine, check, identify, load_robot, read_log
 from omnidyn.errors import InputError
-from omnidyn.logs.read_log import LogOptions, load_log
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from omnidyn.logs.segments import segments
 from omnidyn.run import Run
 from tests.support.cases import case
@@ -36,7 +36,7 @@ def three_wheels(tmp_path, wheels, row=1500):
 def test_counters_that_begin_again_are_a_gap_with_and_without_a_robot(tmp_path, wheels, robot):
     path, speed = three_wheels(tmp_path, wheels)
     model = load_robot(robot) if robot else None
-    log = load_log(path, model, LogOptions(assume=TICKS))
+    log = recorded_log(path, model, LogOptions(assume=TICKS))
     verdict = check(log, model)
     (finding,) = verdict.of("counter_restart")
     assert finding.severity == "warning"
@@ -88,7 +88,7 @@ def test_a_board_that_restarts_makes_two_recordings(tmp_path, text, again):
     path = serial(tmp_path, text=text, again=again)
     with pytest.raises(InputError, match="leave such rows out with `skip_bad_rows`"):
         read_log(path, assume=TICKS)
-    log = load_log(path, options=LogOptions(assume=TICKS, skip_bad_rows=True))
+    log = recorded_log(path, options=LogOptions(assume=TICKS, skip_bad_rows=True))
     verdict = check(log)
     (finding,) = verdict.of("clock_restart")
     assert "at 0.6 s after 8.78 s" in str(finding)
@@ -124,16 +124,16 @@ def test_a_single_time_far_from_all_others_costs_its_row(tmp_path):
 
 
 def test_the_cases_of_counters_and_boards():
-    log = load_log(case("logs/count_restart/reset.csv"), options=LogOptions(assume=TICKS))
+    log = recorded_log(case("logs/count_restart/reset.csv"), options=LogOptions(assume=TICKS))
     assert check(log).of("counter_restart")[0].rows == ((2702, 2702),)
     robot = load_robot(case("logs/counter_reset/kiwi_d.toml"))
     for model in (None, robot):
-        log = load_log(case("logs/counter_reset/kiwi2_reset.csv"), model, LogOptions(assume=ROBOT_ASSUME))
+        log = recorded_log(case("logs/counter_reset/kiwi2_reset.csv"), model, LogOptions(assume=ROBOT_ASSUME))
         verdict = check(log, model)
         assert verdict.of("counter_restart")[0].subject == "a1 a2 a3"
         assert not verdict.of("slip")
     options = LogOptions(assume=ROBOT_ASSUME, skip_bad_rows=True)
-    log = load_log(case("logs/serial_restart/kiwi2_glitch.csv"), robot, options)
+    log = recorded_log(case("logs/serial_restart/kiwi2_glitch.csv"), robot, options)
     assert not check(log, robot).has_errors
     assert [len(part) for part in log.recordings()] == [1245, 1249]
 

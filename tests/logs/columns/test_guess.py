@@ -386,15 +386,16 @@ def test_units_in_capitals_are_units(tmp_path):
         (np.arange(ROWS) * 30.0 % 360.0, ""),
         ((np.arange(ROWS) * 30.0 + 180.0) % 360.0 - 180.0, ""),
         (np.arange(ROWS) * 0.5 % 6.28, "rad"),
-        (np.arange(ROWS) * 30.0, "rad"),
+        (np.arange(ROWS) * 30.0, ""),
+        (np.arange(ROWS) * 3.0, "rad"),
     ],
 )
-def test_a_heading_that_jumps_by_360_is_not_taken_as_radians(tmp_path, yaw, taken):
+def test_a_heading_that_jumps_as_degrees_do_is_not_taken_as_radians(tmp_path, yaw, taken):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "x_m": 1, "yaw": yaw}))
     assert (columns.columns["heading"].unit if "heading" in columns.columns else "") == taken
     if not taken:
         assert said(columns.doubts) == (
-            "yaw looks like heading, but no unit is given, and it jumps by 360 as degrees do: not taken; say `column` "
+            "yaw looks like heading, but no unit is given, and it jumps as degrees do: not taken; say `column` "
             '"heading=yaw:deg"',
         )
 

@@ -7,7 +7,7 @@ import pytest
 
 from omnidyn.cli import main
 from omnidyn.logs.columns.guess import guess_columns
-from omnidyn.logs.read_log import load_log
+from omnidyn.logs.read_log import recorded_log
 from omnidyn.logs.table.table import FileTable
 from tests.logs.columns.test_guess import ROWS, clock, table_of
 from tests.support.codes import said
@@ -64,7 +64,7 @@ def test_nanoseconds_since_1970_keep_their_steps(tmp_path):
     path = tmp_path / "log.csv"
     rows = [f"{1_700_000_000_000_000_000 + 10_000_000 * k},{k}" for k in range(50)]
     path.write_text("\n".join(["timestamp,w1_rad_s", *rows]))
-    assert load_log(path).t == pytest.approx(np.arange(50) / 100.0, abs=3e-7)
+    assert recorded_log(path).t == pytest.approx(np.arange(50) / 100.0, abs=3e-7)
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_the_channels_of_an_oscilloscope_are_no_numbers_of_wheels(tmp_path, head
     path = tmp_path / "scope.csv"
     rows = [f"{-0.1 + 0.01 * k:+.3E},{6 - k / 10:+.3E},{k / 10:+.3E}" for k in range(60)]
     path.write_text("\n".join([head, *rows]))
-    log = load_log(path)
+    log = recorded_log(path)
     assert log.t == pytest.approx(-0.1 + 0.01 * np.arange(60))
     assert log.channels["voltage"][:, 0] == pytest.approx(6.0 - np.arange(60) / 10.0)
     assert log.channels["current"][:, 0] == pytest.approx(np.arange(60) / 10.0)
@@ -91,7 +91,7 @@ def test_the_channels_of_an_oscilloscope_are_no_numbers_of_wheels(tmp_path, head
 def test_two_channels_of_one_kind_are_asked_about(tmp_path):
     path = tmp_path / "scope.csv"
     path.write_text("x-axis,1,2\ns,V,V\n" + "\n".join(f"{0.01 * k:.2f},{k},{k}" for k in range(60)))
-    assert said(load_log(path).columns.doubts) == (
+    assert said(recorded_log(path).columns.doubts) == (
         "1, 2 look like u1, but no number says which wheel each is (say `column` u1=1 and so on): not taken",
     )
 

@@ -181,3 +181,24 @@ def test_an_angle_in_another_unit_is_named_beside_its_speed(unit, seed):
     verdict = omnidyn.check(Log(np.arange(rows) * step, channels, np.arange(rows) + 2))
     codes = {finding.code for finding in verdict.findings if "heading" in finding.subject or "omega" in finding.subject}
     assert bool(codes & {"unit", "scale", "time_unit"}) == (unit != "rad")
+
+
+@pytest.mark.parametrize("name", ["heading", "heading_rad"])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_heading_that_cannot_be_followed_from_row_to_row_is_asked_about(name, seed):
+    rng, rows = np.random.default_rng(seed), 600
+    step, rate = rng.uniform(0.05, 0.2), rng.uniform(1.5, 3.0) * np.sin(np.linspace(0.0, 40.0, rows))  # 4 deg a row
+    turned = np.cumsum(rate) * step + 0.001 * rng.normal(size=rows)
+    wrapped = np.angle(np.exp(1j * turned))
+    spun = np.cumsum(np.full(rows, rng.uniform(1.0, 2.5) / step)) * step  # 2.5 rad a row, never wrapped
+    for angle in (turned, wrapped, wrapped % (2.0 * np.pi), spun):
+        assert "heading" in guess_of(name, angle, step).columns
+    columns = guess_of(name, np.degrees(turned), step)
+    assert "heading" not in columns.columns
+    assert "it jumps as degrees do" in said(columns.doubts)[0]
+    assert "heading" in guess_of("heading_deg", np.degrees(turned), step).columns
+
+
+def guess_of(name, values, step):
+    cells = {"t_s": step * np.arange(len(values)), name: values}
+    return guess_columns(FileTable(tuple(cells), cells, np.arange(len(values)) + 2, {}, "log.csv", "", ()), None, {})

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.logs.read_log import load_log, read_log
+from omnidyn.logs.read_log import read_log, recorded_log
 from omnidyn.model.wheels import wheel_speed
 from tests.support.axebot_logs import voltages
 from tests.support.codes import said
@@ -35,7 +35,7 @@ def log_of(path, order, signs, seed=0, blank=1):
 def test_the_motion_proposes_the_order_and_the_signs(tmp_path, order, signs, blank):
     path, speed = log_of(tmp_path / "a.csv", np.array(order), np.array(signs), blank=blank)
     robot = omnidyn.load_robot("axebot")
-    log = load_log(path, robot)
+    log = recorded_log(path, robot)
     assert "wheel_speed" not in log.channels
     told = {f"w{wheel + 1}": f"{'-' * (signs[k] < 0)}{NAMES[k]}" for k, wheel in enumerate(order)}
     words = ", ".join(f"{name}={told[name]}" for name in sorted(told))
@@ -47,7 +47,7 @@ def test_the_motion_agrees_with_places_or_is_asked_about(tmp_path):
     """left, right, back of an axebot, whose wheels stand at 180, -60 and 60 degrees: wheels 3, 2 and 1."""
     path, speed = log_of(tmp_path / "a.csv", np.array([2, 1, 0]), np.array([1, 1, 1]))
     robot = omnidyn.load_robot("axebot")
-    log = load_log(path, robot)
+    log = recorded_log(path, robot)
     np.testing.assert_allclose(log.channels["wheel_speed"], speed, rtol=1e-14)
     assert not said(log.columns.doubts)
 
@@ -55,9 +55,11 @@ def test_the_motion_agrees_with_places_or_is_asked_about(tmp_path):
 def test_without_a_robot_or_a_motion_it_is_asked_as_before(tmp_path):
     path, _ = log_of(tmp_path / "a.csv", np.arange(3), np.ones(3))
     path.write_text(path.read_text().replace("back_", "other_"))  # places all around would say which wheel each is
-    assert any("say `column` w1=left_speed_rad_s and so on" in doubt for doubt in said(load_log(path).columns.doubts))
+    assert any(
+        "say `column` w1=left_speed_rad_s and so on" in doubt for doubt in said(recorded_log(path).columns.doubts)
+    )
     text = path.read_text().splitlines()
     short = [",".join(line.split(",")[:4]) for line in text]
     path.write_text("\n".join(short) + "\n")
-    log = load_log(path, omnidyn.load_robot("axebot"))
+    log = recorded_log(path, omnidyn.load_robot("axebot"))
     assert any("say `column` w1=left_speed_rad_s and so on" in doubt for doubt in said(log.columns.doubts))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.logs.read_log import load_log
+from omnidyn.logs.read_log import recorded_log
 from omnidyn.logs.readers.read_table import read_table
 
 T = np.arange(60) / 50 + 12.3
@@ -19,7 +19,7 @@ def test_a_list_of_advantagescope_is_a_topic_for_each_key(tmp_path):
         rows += [f"{t:.6f},/Drive/enabled,{'true' if k else 'false'}", f"{t:.6f},/Mode,auto"] * (k % 10 == 0)
     path = tmp_path / "list.csv"
     path.write_text("\n".join(rows) + "\n")
-    log = load_log(path)
+    log = recorded_log(path)
     known = np.isfinite(log.channels["wheel_speed"]).all(axis=1)
     np.testing.assert_allclose(log.t[known], T, atol=1e-9)
     np.testing.assert_array_equal(log.channels["wheel_speed"][known], np.arange(60)[:, None] + [0.5, 1.0, 1.5])
@@ -48,7 +48,7 @@ def test_a_table_of_advantagescope_is_a_log(tmp_path):
     rows += [f"{t:.6f},{k},{2 * k},{3 * k},{'true' if k > 5 else 'false'},auto" for k, t in enumerate(T)]
     path = tmp_path / "table.csv"
     path.write_text("\n".join(rows) + "\n")
-    log = load_log(path)
+    log = recorded_log(path)
     np.testing.assert_array_equal(log.channels["wheel_speed"], np.arange(60)[:, None] * [1.0, 2.0, 3.0])
 
 
@@ -63,7 +63,7 @@ def test_a_table_of_plotjuggler_is_a_log(tmp_path):
         rows.append(",".join([f"{1.7e9 + t:.6f}", "1", "2", f"{k}", *odom, "0.5", "0", "0"]))
     path = tmp_path / "juggler.csv"
     path.write_text("\n".join(rows) + "\n")
-    run = load_log(path).to_run()
+    run = recorded_log(path).to_run()
     np.testing.assert_array_equal(run.wheel_speed[:, 2], np.arange(60.0))
     np.testing.assert_array_equal(run.twist_command[:, 0], 0.5)
     known = np.isfinite(run.twist[:, 2])

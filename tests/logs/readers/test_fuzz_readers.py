@@ -2,8 +2,8 @@
 
 import pytest
 
-from benchmarks import fuzz_readers
-from benchmarks.fuzz_readers import FORMATS, READERS, measure
+from benchmarks.logs import fuzz_readers
+from benchmarks.logs.fuzz_readers import FORMATS, READERS, measure
 
 LONG = 1.5  # [s] for a format; bench fuzz_readers takes a minute for each reader
 

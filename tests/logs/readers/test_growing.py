@@ -7,7 +7,7 @@ import sqlite3
 
 import pytest
 
-from benchmarks.fuzz_readers import READERS
+from benchmarks.logs.fuzz_readers import READERS
 from omnidyn import read_log
 from omnidyn.logs.info import read_info
 from omnidyn.logs.readers.read_table import read_table

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import omnidyn.cli.check
-from omnidyn import check, load_log, load_robot, read_log
+from omnidyn import check, load_robot, read_log
 from omnidyn.cli import main
 from omnidyn.errors import InputError
+from omnidyn.logs.read_log import recorded_log
 from omnidyn.logs.segments import segments
 from tests.support.codes import said
 from tests.support.lerobot_set import NAMES, ROWS, lerobot_episode, pa, write_dataset
@@ -37,7 +38,7 @@ def test_the_folder_and_its_one_file_are_the_same_log(tmp_path):
 
 @pytest.mark.parametrize("files", [1, 3])
 def test_each_episode_is_a_recording_of_its_own(tmp_path, files):
-    log = load_log(write_dataset(tmp_path / "set", [lerobot_episode(seed) for seed in range(3)], files=files))
+    log = recorded_log(write_dataset(tmp_path / "set", [lerobot_episode(seed) for seed in range(3)], files=files))
     steps = np.diff(log.t)
     assert [part.start for part in segments(log.t)] == [0, ROWS, 2 * ROWS]
     np.testing.assert_allclose(np.delete(steps, [ROWS - 1, 2 * ROWS - 1]), 1.0 / 30.0, atol=1e-5)
@@ -55,7 +56,7 @@ def test_a_state_that_is_the_action_of_a_row_before_is_no_measurement(tmp_path, 
     echo[:late] = 0.0
     echo = echo.astype(np.float32).astype(float) if single else echo
     verdict = check(
-        load_log(write_dataset(tmp_path / "set", [(command, echo)]), load_robot("lekiwi")), load_robot("lekiwi")
+        recorded_log(write_dataset(tmp_path / "set", [(command, echo)]), load_robot("lekiwi")), load_robot("lekiwi")
     )
     (finding,) = verdict.of("echo")
     assert finding.severity == "error"
@@ -65,13 +66,13 @@ def test_a_state_that_is_the_action_of_a_row_before_is_no_measurement(tmp_path, 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_state_that_was_measured_is_no_echo(tmp_path, seed):
-    assert not check(load_log(write_dataset(tmp_path / "set", [lerobot_episode(seed)]))).of("echo")
+    assert not check(recorded_log(write_dataset(tmp_path / "set", [lerobot_episode(seed)]))).of("echo")
 
 
 def test_a_robot_that_hardly_moves_is_no_echo(tmp_path):
     command, seen = np.zeros((ROWS, 3)), np.zeros((ROWS, 3))
     command[40:, 0], seen[45:, 0] = 0.2, 0.199
-    assert not check(load_log(write_dataset(tmp_path / "set", [(command, seen)]))).of("echo")
+    assert not check(recorded_log(write_dataset(tmp_path / "set", [(command, seen)]))).of("echo")
 
 
 def test_what_is_lacking_is_said(tmp_path):
@@ -95,7 +96,7 @@ def test_many_short_episodes_do_not_hide_an_echo(tmp_path, late):
     """The rows on either side of a gap are not compared: with episodes of 4 s they are 2 % of all."""
     commands = [lerobot_episode(seed)[0] for seed in range(6)]
     echoes = [np.concatenate([np.full((late, 3), 0.1), command[:-late]]).astype(np.float32) for command in commands]
-    verdict = check(load_log(write_dataset(tmp_path / "set", list(zip(commands, echoes, strict=True)))))
+    verdict = check(recorded_log(write_dataset(tmp_path / "set", list(zip(commands, echoes, strict=True)))))
     assert [finding.numbers["rows"] for finding in verdict.of("echo")] == [late]
 
 

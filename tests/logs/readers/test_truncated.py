@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from benchmarks.fuzz_readers import READERS
+from benchmarks.logs.fuzz_readers import READERS
 from omnidyn.errors import InputError, OmnidynError
 from omnidyn.logs.info import read_info
 from omnidyn.logs.readers.read_table import read_table

@@ -11,7 +11,7 @@ from omnidyn.findings.check import check
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.logs.mcap_run import messages
-from omnidyn.logs.read_log import load_log, read_log
+from omnidyn.logs.read_log import read_log, recorded_log
 from omnidyn.logs.run_file import run_columns, write_run
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
@@ -92,7 +92,7 @@ def test_every_format_gives_the_same_verdict_and_the_same_fit(run, tmp_path):
         assert again.replace(source="", warnings=()) == run
         fit = identify(again.replace(source=""), robot, OutputError(nuisances=(), start="rest")).estimate
         answers[suffix] = json.dumps([fit.value, fit.std], default=float)
-        verdict = check(load_log(path, robot), robot)
+        verdict = check(recorded_log(path, robot), robot)
         grave = {(finding.code, finding.subject) for finding in verdict.findings if finding.severity != "note"}
         verdicts[suffix] = grave, verdict.has_errors
     assert len(set(answers.values())) == 1

@@ -38,6 +38,11 @@ def robot():
         ({"voltage": np.array(VOLTS) > 0.0}, "voltage: not numbers"),
         ({"start_twist": (1j, 0.0, 0.0)}, "twist: not numbers"),
         ({"start_twist": (True, False, False)}, "twist: not numbers"),
+        ({"start_twist": (1e30, 0.0, 0.0)}, "twist: no robot starts there"),
+        ({"start_twist": (np.nan, 0.0, 0.0)}, "twist: cannot start there"),
+        ({"start_pose": (1e30, 0.0, 0.0)}, "pose: no robot starts there"),
+        ({"substeps": 0}, "substeps: cannot cut a row into so many steps"),
+        ({"substeps": 1.5}, "substeps: cannot cut a row into so many steps"),
     ],
     ids=lambda case: "-".join(case) if isinstance(case, dict) else "",
 )

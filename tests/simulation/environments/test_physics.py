@@ -7,6 +7,7 @@ import omnidyn
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.log_effects import Sensors
+from omnidyn.simulation.batch.parameters import batch_parameters
 from omnidyn.simulation.environments.environments import Environments, Setting
 from omnidyn.simulation.environments.pool import Range, largest_voltage
 from omnidyn.simulation.live import LiveRobot
@@ -231,7 +232,8 @@ def test_implicit_poses_are_near_those_of_a_fine_tolerance(name):
 def test_other_laws_are_refused_by_name():
     with pytest.raises(UnsupportedError, match="current limit"):
         Environments(AXEBOT.replace(motor=AXEBOT.motor.replace(current_limit=2.0)))
-    with pytest.raises(UnsupportedError, match="speed loop"):
-        Environments(omnidyn.load_robot("robotino"))
+    with pytest.raises(InputError, match="they leave out the loop"):
+        speed = omnidyn.load_robot("robotino")
+        Environments(speed, parameters=batch_parameters([speed]))
     with pytest.raises(InputError, match="one kind of drive"):
         Environments([AXEBOT, turning()])

@@ -45,17 +45,20 @@ from omnidyn.control.controller import (
     per_volt,
     supply_of,
     vector,
-    without_slip,
 )
 from omnidyn.control.feedforward import DT, check_dt, loop_motor
 from omnidyn.control.filtered_twist import FilteredTwist, filtered_twist
-from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Memory, MpcBatch, MpcWorkspace, control_step, expect
+from omnidyn.control.mpc.batch import MpcBatch
+from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, control_step, expect
+from omnidyn.control.mpc.memory import Memory, MpcWorkspace
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import PUSH, SCALE
-from omnidyn.control.mpc.settings import FILTERED, Preview, Settings
+from omnidyn.control.mpc.preview import Preview
+from omnidyn.control.mpc.settings import FILTERED, Settings
 from omnidyn.control.pose_estimator import PoseEstimator, pose_estimator
 from omnidyn.control.pose_gate import TRUSTED, PoseGate
 from omnidyn.control.swing import Swing
+from omnidyn.control.without_slip import without_slip
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope
@@ -143,7 +146,7 @@ class Mpc:
         self._tables = self.robot_settings.tables(driven, self.dt, self.observer)
         self._filtered_twist = filtered_twist(robot, self._filtered_twist)
         self._gate = PoseGate(robot, self.dt, vars(self).get("_gate"))
-        self._swing = Swing(robot, self.dt)
+        self.swing = Swing(robot, self.dt)
         self._control = None  # compiled by the first step
 
     def reset(self) -> None:
@@ -152,7 +155,7 @@ class Mpc:
         self._known, self._t, self._last = False, math.nan, self._zeros.copy()
         self._asked: tuple[str, int, float] = (WAITING, 0, 0.0)
         self._state, self._missing, self._since = np.zeros(6), 0, math.nan
-        for sensor in (self._estimator, self._filtered_twist, self._gate, self._swing):
+        for sensor in (self._estimator, self._filtered_twist, self._gate, self.swing):
             if sensor is not None:
                 sensor.reset()
 
@@ -286,7 +289,7 @@ class Mpc:
             sent = np.clip(sent, -self.limit, self.limit)
         self._last = sent
         wanted, (vx, vy, omega) = preview.rows[row - preview.late, 3:].tolist(), self._state[3:].tolist()
-        swinging = self._swing.found(float(t), vx - wanted[0], vy - wanted[1], omega - wanted[2])
+        swinging = self.swing.found(float(t), vx - wanted[0], vy - wanted[1], omega - wanted[2])
         status = INACCURATE if inaccurate else SWINGS if swinging else PATH_ENDED if t > preview.end else OK
         self._asked = (status, passes, time.perf_counter() - start)
         return sent.copy()

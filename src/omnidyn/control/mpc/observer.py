@@ -16,8 +16,9 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
+from omnidyn.control.mpc.columns import V
 from omnidyn.control.mpc.model import PHI, STEP, SUM, SUM_DRIVE, SUM_TWIST
-from omnidyn.control.mpc.riccati import V, advance
+from omnidyn.control.mpc.riccati import advance
 from omnidyn.control.mpc.small import matrix, minus, mv, plus, put3, vector
 from omnidyn.control.mpc.stages import friction_at, linear_stage
 

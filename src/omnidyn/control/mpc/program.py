@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.control.mpc.model import DECAY, FALLING, FEED, SLOW_SPEED, SLOW_SPEEDS, TURNING
+from omnidyn.control.mpc.columns import PULL, WAY, WEIGHT
+from omnidyn.control.mpc.linear_motion import STANDSTILL
+from omnidyn.control.mpc.model import DECAY, FEED, TURNING
 from omnidyn.control.mpc.observer import PUSH, SCALE
-from omnidyn.control.mpc.riccati import PULL, WAY, WEIGHT
-from omnidyn.control.mpc.small import dot, matrix, minus, mv, plus, put3, vector
-from omnidyn.control.mpc.stages import frame_at, friction_at, level_at, linear_stage
+from omnidyn.control.mpc.small import matrix, minus, mv, plus, put3, vector
+from omnidyn.control.mpc.stages import frame_at, friction_at, linear_stage
 
 POSE_WEIGHT, TWIST_WEIGHT, LAST_WEIGHT, AGAIN, LEARN = 0, 3, 6, 7, 8  # entries of `settings`
 SLEW, CURRENT, SPEED, SPEED_WEIGHT = 9, 10, 11, 14  # limits: V a step, whether, [m/s], cost
@@ -46,10 +47,10 @@ def make_costs(numbers, settings, estimate, program, preview, start, add):
             stage[k, WEIGHT + i], stage[k, PULL + i] = weight, -weight * goal
         now, then = vector(preview, row, 3), vector(preview, row + 1, 3)
         middle = 0.5 * (now[0] + then[0]), 0.5 * (now[1] + then[1]), 0.5 * (now[2] + then[2])
-        way = homeward(preview, row, add, program.x, k)
-        put3(stage, k, WAY, way)
-        way = plus(middle, way)
-        drive = plus(mv(feed, minus(then, mv(decay, now))), friction_at(linear, levels, scale, way, 1.0, False)[0])
+        velocity = homeward(preview, row, add, program.x, k)
+        put3(stage, k, WAY, velocity)
+        velocity = plus(middle, velocity)
+        drive = plus(mv(feed, minus(then, mv(decay, now))), friction_at(linear, levels, scale, velocity, 1.0, False)[0])
         drive = minus(drive, push)
         if linear[0, TURNING] != 0.0:
             drive = minus(drive, frame_at(linear, middle)[0])
@@ -67,106 +68,11 @@ def make_stages(numbers, estimate, program):
     linear, levels, stage, x = numbers.linear, numbers.levels, program.stage, program.x
     push = vector(estimate, PUSH, 0)
     for k in range(len(stage)):
-        end, way = vector(x, k + 1, 3), vector(stage, k, WAY)
+        end, velocity = vector(x, k + 1, 3), vector(stage, k, WAY)
         sense = (
-            end[0] + min(max(way[0], -STANDSTILL[0]), STANDSTILL[0]),
-            end[1] + min(max(way[1], -STANDSTILL[1]), STANDSTILL[1]),
-            end[2] + min(max(way[2], -STANDSTILL[2]), STANDSTILL[2]),
+            end[0] + min(max(velocity[0], -STANDSTILL[0]), STANDSTILL[0]),
+            end[1] + min(max(velocity[1], -STANDSTILL[1]), STANDSTILL[1]),
+            end[2] + min(max(velocity[2], -STANDSTILL[2]), STANDSTILL[2]),
         )
         friction = friction_at(linear, levels, estimate[SCALE], sense, 1.0, True)
         linear_stage(linear, friction, push, stage, k, x[k, 2], vector(x, k, 3), end)
-
-
-# The motion along which a step is made linear: that of the step before, shifted by one; and whether to do it again
-
-TURN = 6.283185307179586
-STANDSTILL = tuple(SLOW_SPEEDS.tolist())  # [m/s, m/s, rad/s] below which robot and path stand still
-COMPARED_STEPS = 21  # steps of the horizon that are compared: later ones are looked at again before they matter
-# Share of friction, [rad], [V]: what differs by less is the same motion.
-FRICTION_CHANGE, HEADING_CHANGE, VOLTAGE_CHANGE = 0.25, 0.02, 0.05
-
-
-@part
-def shift(memory, elapsed, preview, start):
-    """The prediction of the last step as guess of this one; the reference where there is none."""
-    x, u, active, fast = memory.x, memory.u, memory.active, memory.fast
-    n = len(u)
-    if elapsed == 0.0:
-        for k in range(n + 1):
-            put3(x, k, 0, vector(preview, start + k, 0))
-            put3(x, k, 3, vector(preview, start + k, 3))
-        for k in range(n):
-            for i in range(u.shape[1]):
-                active[k, i] = 0
-            for i in range(3):
-                fast[k, i] = 0
-        return
-    for k in range(n):
-        put3(x, k, 0, vector(x, k + 1, 0))
-        put3(x, k, 3, vector(x, k + 1, 3))
-        for i in range(u.shape[1]):
-            active[k, i] = active[k + 1, i] if k + 1 < n else 0
-        for i in range(3):
-            fast[k, i] = fast[k + 1, i] if k + 1 < n else 0
-
-
-@part
-def rests(preview, start, x):
-    """Whether robot and path stand still: then the motion predicted last is no guess for this step."""
-    for i in range(3):
-        if abs(x[0, 3 + i]) >= STANDSTILL[i]:
-            return False
-        for k in range(len(x)):
-            if abs(preview[start + k, 3 + i]) >= STANDSTILL[i]:
-                return False
-    return True
-
-
-@part
-def stay(x):
-    """Predict that the robot stays where it is."""
-    for k in range(1, len(x)):
-        put3(x, k, 0, vector(x, 0, 0))
-        put3(x, k, 3, (0.0, 0.0, 0.0))
-
-
-@part
-def nearest_turn(heading, reference):
-    """What to add to headings of the reference so that they are nearest to the robot's [rad]."""
-    return TURN * round((heading - reference) / TURN)
-
-
-@part
-def between(x, before):
-    """Twists half-way between two predictions: what would swing from one direction to the other comes to rest."""
-    for k in range(1, len(x)):
-        for i in range(3, 6):
-            x[k, i] = 0.5 * (x[k, i] + before[k, i])
-
-
-@part
-def moved(levels, emf, limited, x, before):
-    """Whether a prediction differs from the one it was made along: other friction, another heading.
-
-    limited: or, where currents are limited, another back-EMF.
-    """
-    for k in range(1, min(len(x), COMPARED_STEPS)):
-        if abs(x[k, 2] - before[k, 2]) > HEADING_CHANGE:
-            return True
-        twist, twist_before = vector(x, k, 3), vector(before, k, 3)
-        for e in range(len(levels)):
-            g = vector(levels, e, 0)
-            r = 1.0 / levels[e, SLOW_SPEED]
-            a, b = min(max(dot(g, twist) * r, -1.0), 1.0), min(max(dot(g, twist_before) * r, -1.0), 1.0)
-            if abs(a - b) > FRICTION_CHANGE:
-                return True
-            if levels[e, FALLING] > 0.0:
-                now, then = level_at(levels, e, dot(g, twist))[0], level_at(levels, e, dot(g, twist_before))[0]
-                if abs(now - then) > FRICTION_CHANGE * now:
-                    return True
-        if limited:
-            change = twist[0] - twist_before[0], twist[1] - twist_before[1], twist[2] - twist_before[2]
-            for i in range(len(emf)):
-                if abs(dot(vector(emf, i, 0), change)) > VOLTAGE_CHANGE:
-                    return True
-    return False

@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
+from omnidyn.control.mpc.columns import CP, CV, GX, GY, HP, HV, E, V
 from omnidyn.control.mpc.model import (
     BACKWARD,
     BY_MASS,
@@ -40,7 +41,6 @@ from omnidyn.control.mpc.model import (
     STEP,
     TURNING,
 )
-from omnidyn.control.mpc.riccati import CP, CV, GX, GY, HP, HV, E, V
 from omnidyn.control.mpc.small import added, inverse, matrix, minus, mm, mv, plus, put3, put9, vector
 from omnidyn.model.friction.stribeck import fall
 

@@ -6,30 +6,18 @@ import difflib
 import math
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from omnidyn.arguments import unknown_option
 from omnidyn.arrays import FloatArray
 from omnidyn.control.paths.adapter import DURATION, FunctionPath, as_path
-from omnidyn.control.paths.curve import (
-    COLUMNS,
-    Curve,
-    Polyline,
-    circle,
-    eight,
-    lines,
-    path_of_file,
-    path_of_run,
-    square,
-    swinging,
-    zigzag,
-)
-from omnidyn.control.paths.motion import Path, Reference
+from omnidyn.control.paths.curve import Curve, circle, eight, square, swinging, zigzag
+from omnidyn.control.paths.goal import Goal
+from omnidyn.control.paths.motion import Path
+from omnidyn.control.paths.polyline import COLUMNS, Polyline, lines, path_of_file, path_of_run
 from omnidyn.errors import InputError
 from omnidyn.run import Run
 
@@ -264,37 +252,3 @@ _MAKERS: dict[str, Callable[[str, Mapping[str, Any], Mapping[str, Any]], Path]] 
 }
 
 __all__ = ["Path", "Polyline", "path"]
-
-
-# One pose to reach and to hold: from rest at the start to rest at the goal along a straight line
-#
-# s = 10 p^3 - 15 p^4 + 6 p^5,  p = t/T      no jump of speed or acceleration at either end
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Goal(Path):
-    """start, goal: poses [m, m, rad], shape (3,). travel [s]: between them; 0 stands at the goal from the first."""
-
-    name: str
-    start: FloatArray
-    goal: FloatArray
-    travel: float
-    duration: float
-
-    @property
-    def end(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """When it is at the goal [s]."""
-        return self.travel
-
-    def at(self, t: ArrayLike) -> Reference:
-        """See Path."""
-        time = np.asarray(t, dtype=float)
-        way = self.goal - self.start
-        if self.travel == 0.0:
-            rest = np.zeros((*time.shape, 3))
-            return Reference(np.broadcast_to(self.goal, rest.shape).copy(), rest, rest.copy())
-        p = np.clip(time / self.travel, 0.0, 1.0)[..., None]
-        part = p**3 * (10.0 - 15.0 * p + 6.0 * p**2)
-        rate = 30.0 * p**2 * (1.0 - p) ** 2 / self.travel
-        change = 60.0 * p * (1.0 - p) * (1.0 - 2.0 * p) / self.travel**2
-        return Reference(self.start + part * way, rate * way, change * way)

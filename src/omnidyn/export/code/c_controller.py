@@ -43,6 +43,7 @@ from omnidyn.control.pose_estimator import (
     rows_of,
 )
 from omnidyn.control.speed_loop import MOST_STEPS, SpeedController
+from omnidyn.control.swing import CHANGES, WINDOW
 from omnidyn.export.code.mpc_code import mpc_code, mpc_input, mpc_memory, mpc_switches
 from omnidyn.export.code.trace import statements
 from omnidyn.export.contract import Export
@@ -79,7 +80,9 @@ def c_controller(robot: Robot, controller: str | os.PathLike = "pid", dt: float 
     code = mpc_code(law) if predicts else control_code(law)  # pyright: ignore[reportArgumentType]  none is refused
     about = [f"{law.name} of {robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in omissions)]
     head = c_comment(about)
-    code = "\n\n".join([f"{head}\n{_INCLUDES.rstrip()}", _late_pose_code(law), code])
+    swing = _swing_code(law) if _can_swing(law) else ""
+    swing = f"#if OMNIDYN_SWING\n{swing}\n#endif" if predicts else swing
+    code = "\n\n".join(part for part in (f"{head}\n{_INCLUDES.rstrip()}", _late_pose_code(law), swing, code) if part)
     texts = {"omnidyn_control.h": _header(law, head), "omnidyn_control.c": f"{code}\n"}
     return Export(KIND, robot.name, texts, omissions, notes, folder=True)
 
@@ -101,9 +104,11 @@ def _header(law: Any, about: str) -> str:
         DEFINES=defines,
         UNITS=_UNITS[law.output],
         MEMORY=(mpc_memory(law) if predicts else _MEMORY + _LOOP_MEMORY * _is_commanded(law))
-        + ("\n    omnidyn_late late;" if _is_late(law) else ""),
+        + ("\n    omnidyn_late late;" if _is_late(law) else "")
+        + ("\n    omnidyn_swing swing;" if _can_swing(law) else ""),
         INPUT=(f"{mpc_input(law)}\n\n" if predicts else "")
-        + (f"{filled(_LATE, ROWS=str(_late_rows(law))).strip()}\n\n" if _is_late(law) else ""),
+        + (f"{filled(_LATE, ROWS=str(_late_rows(law))).strip()}\n\n" if _is_late(law) else "")
+        + (f"{filled(_SWING, CHANGES=str(CHANGES)).strip()}\n\n" if _can_swing(law) else ""),
         AHEAD=_AHEAD if predicts else _NOW_AND_AHEAD,
         ROWS="OMNIDYN_HORIZON + 1" if predicts else "3",
         BRIDGED=str(MOST_BRIDGED),
@@ -142,6 +147,26 @@ def _late_pose_code(law: Any) -> str:
     text = files("omnidyn.export.code").joinpath("pose_estimator.c").read_text("utf-8")
     return f"#include <string.h>\n\n{defines}\n\n{text.strip()}"
 
+
+def _can_swing(law: Any) -> bool:
+    """Whether it says that its loop swings."""
+    return isinstance(law, Pid | Mpc)
+
+
+def _swing_code(law: Pid | Mpc) -> str:
+    """The function that finds out whether its loop swings."""
+    defines = f"#define SWING_CHANGES {CHANGES}\n#define SWING_WINDOW {_c(WINDOW)}"
+    least = f"static const float SWING_LEAST[3] = {{{_numbers(law.swing.least)}}};"
+    text = files("omnidyn.export.code").joinpath("swing.c").read_text("utf-8")
+    return f"{defines}\n{least}\n\n{text.strip()}"
+
+
+_SWING = """
+/* Of each axis: the side of the error of its speed, and for how long [s] its last changes count. */
+typedef struct {
+    float side[3], left[3][@CHANGES@];
+} omnidyn_swing;
+"""
 
 TINY_IN_C = 2e-6  # [m], [rad]: what float32 makes of poses of some metres
 _LATE_NUMBERS = {
@@ -198,12 +223,13 @@ typedef struct {
 @MEMORY@
 } omnidyn_control;
 
-/* What a step says of itself. Up to OMNIDYN_STILL the output is as wanted; from OMNIDYN_BACKWARDS on it is zeros, but
+/* What a step says of itself. Up to OMNIDYN_SWINGS the output is as wanted; from OMNIDYN_BACKWARDS on it is zeros, but
    that @BRIDGED@ measurements missing in a row are bridged. */
 enum {
     OMNIDYN_OK,
     OMNIDYN_LIMITED,   /* a motor is at a limit of voltage or current */
     OMNIDYN_STILL,     /* no time has gone by: the last output again */
+    OMNIDYN_SWINGS,    /* the loop swings: correct latency_s of [drive], or lower the gains */
     OMNIDYN_BACKWARDS, /* time went backwards: errors summed up are forgotten */
     OMNIDYN_BAD_TIME,
     OMNIDYN_BAD_POSE,
@@ -239,10 +265,18 @@ int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[
 ROUNDING = 1e-6
 AnyOf = Feedforward | Pid | SpeedController
 NOTHING = 1e-13  # of the largest share of a motor: it has none
+_SUM = """static float summed(float total, float more, float weight)
+{
+    if (more * total >= 0.0f) { /* of large errors little */
+        return total + weight * more;
+    }
+    return weight < 1.0f && (total + more) * total < 0.0f ? 0.0f : total + more;
+}"""
 _HELPERS = (
     ("sign_of", "static float sign_of(float a) { return (float)((a > 0.0f) - (a < 0.0f)); }"),
     ("min_of", "static float min_of(float a, float b) { return a < b ? a : b; }"),
     ("max_of", "static float max_of(float a, float b) { return a > b ? a : b; }"),
+    ("summed", _SUM),
 )
 
 
@@ -255,15 +289,20 @@ def control_code(controller: AnyOf) -> str:
         traced, body = _feedforward(controller)
     else:
         traced, body = _pid(controller) if isinstance(controller, Pid) else _speed(controller)
-    helpers = [text for name, text in _HELPERS if f"{name}(" in "".join(traced)]
+    helpers = [text for name, text in _HELPERS if f"{name}(" in "".join([*traced, body])]
     tables = {"LIMIT": controller.limit} if controller.output == WHEEL_SPEED else _limits(controller)
     if isinstance(controller, Pid) and controller.output == WHEEL_SPEED:
         tables["VOLTAGE_LIMIT"] = controller.commands.limit
     constants = [f"static const float {name}[{len(table)}] = {{{_numbers(table)}}};" for name, table in tables.items()]
     numbers = {"FARTHEST": _c(LARGEST_STATE), "LARGEST": "3.0e38f", "LATEST": _c(LATEST * controller.dt)}
     numbers["STOPS"] = "\n    self->driven = 0;" if _is_commanded(controller) else ""
+    can_swing = isinstance(controller, Pid)
+    numbers["UNSWUNG"] = "\n    memset(&self->swing, 0, sizeof(self->swing));" if can_swing else ""
+    numbers["SWUNG"], numbers["SWINGS"] = (", swinging", "swinging ? OMNIDYN_SWINGS : ") if can_swing else ("", "")
+    found = "    swinging = swings(&self->swing, elapsed, pose[2], twist, path[0].velocity);\n"
+    numbers["SWING"] = found if can_swing else ""
     step = filled(_STEP, WANTED=textwrap.indent(body, "    "), BRIDGED=str(MOST_BRIDGED), **numbers)
-    include = ["#include <string.h>"] * _is_commanded(controller)
+    include = ["#include <string.h>"] * can_swing
     parts = [*include, "\n".join(constants), "\n".join(helpers), *traced, *_within(controller), step.strip()]
     return "\n\n".join(part for part in parts if part)
 
@@ -368,16 +407,20 @@ def _speed(controller: SpeedController) -> tuple[list[str], str]:
 
 def _summed(controller: Pid | SpeedController, arguments: str) -> str:
     """The loop over sums of errors in C: given, the arguments of `effort` before the sum."""
-    return filled(_SUMMED, LONGEST=_c(MOST_STEPS * controller.dt), GIVEN=arguments).strip()
+    plain = isinstance(controller, SpeedController)
+    raised = "self->sum[k] + off[k] * elapsed" if plain else "summed(self->sum[k], off[k] * elapsed, weight[k])"
+    return filled(_SUMMED, LONGEST=_c(MOST_STEPS * controller.dt), GIVEN=arguments, RAISED=raised).strip()
 
 
 def _pid(controller: Pid) -> tuple[list[str], str]:
     """(functions, statements that put what is wanted into `output`)."""
-    head = "float off[3], velocity[3][3]"
+    head, (place, turn) = "float off[3], weight[3], velocity[3][3]", map(_c, controller.farthest)
     gather = (
         "for (k = 0; k < 9; k++) {\n    velocity[k / 3][k % 3] = path[k / 3].velocity[k % 3];\n}\n"
         "for (k = 0; k < 3; k++) {\n    off[k] = path[0].pose[k] - pose[k];\n}\n"
         f"off[2] = remainderf(off[2], {_c(2.0 * np.pi)});\n"
+        f"weight[0] = weight[1] = {place} / max_of({place}, off[0] * off[0] + off[1] * off[1]);\n"
+        f"weight[2] = {turn} / max_of({turn}, off[2] * off[2]);\n"
     )
     if controller.output == WHEEL_SPEED:
         call = filled(_COMMANDED, LONGEST=_c(MOST_STEPS * controller.dt)).strip()
@@ -457,7 +500,7 @@ _TOGETHER = """
 _SUMMED = """
 elapsed = elapsed < @LONGEST@ ? elapsed : @LONGEST@;
 for (k = 0; k < 3; k++) {
-    more[k] = self->sum[k] + off[k] * elapsed;
+    more[k] = @RAISED@;
 }
 effort(@GIVEN@, more, output, current);
 limited = within(output, current);
@@ -483,7 +526,7 @@ for (k = 0; k < OMNIDYN_WHEELS; k++) {
 }
 for (k = 0; k < 3; k++) {
     self->reached[k] = self->driven ? self->reached[k] : twist[k];
-    more[k] = self->sum[k] + off[k] * elapsed;
+    more[k] = summed(self->sum[k], off[k] * elapsed, weight[k]);
 }
 self->driven = 1;
 commands(off, pose[2], (const float(*)[3])velocity, more, 1.0f, self->reached, self->loop, output, self->mean, volts,
@@ -541,7 +584,7 @@ void omnidyn_control_reset(omnidyn_control *self)
     int k;
     for (k = 0; k < 3; k++) {
         self->sum[k] = 0.0f;
-    }
+    }@UNSWUNG@
     for (k = 0; k < OMNIDYN_WHEELS; k++) {
         self->last[k] = 0.0f;
     }
@@ -554,7 +597,7 @@ void omnidyn_control_reset(omnidyn_control *self)
 int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[3], const float twist[3],
                          const omnidyn_motion path[3], float output[OMNIDYN_WHEELS])
 {
-    int k, limited, why, begun = self->begun;
+    int k, limited, why, begun = self->begun@SWUNG@;
 #if LATE_ROWS
     float now[3];
 #endif
@@ -598,7 +641,7 @@ int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[
         }
     }
     self->missing = 0;
-    limited = wanted(self, begun ? elapsed : 0.0f, pose, twist, path, output);
+@SWING@    limited = wanted(self, begun ? elapsed : 0.0f, pose, twist, path, output);
     for (k = 0; k < OMNIDYN_WHEELS; k++) {
         if (!(fabsf(output[k]) <= @LARGEST@)) {
             return safe(self, output, OMNIDYN_FAILED);
@@ -607,6 +650,6 @@ int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[
         output[k] = output[k] < -LIMIT[k] ? -LIMIT[k] : output[k];
         self->last[k] = output[k];
     }
-    return limited ? OMNIDYN_LIMITED : OMNIDYN_OK;
+    return @SWINGS@limited ? OMNIDYN_LIMITED : OMNIDYN_OK;
 }
 """

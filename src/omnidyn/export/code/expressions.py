@@ -1,6 +1,6 @@
 """Expressions of a kernel as C: (text, type) of each. Names are looked up in the function, then in its module.
 
-What is known beforehand, numbers and the fields of `known`, is worked out here: a branch that it decides falls away.
+What is known beforehand, numbers and `fixed_fields`, is worked out here: a branch that it decides falls away.
 """
 
 from __future__ import annotations
@@ -78,14 +78,14 @@ class Expressions:
         """An expression as a value of a type that it is, or becomes where it meets others."""
         if isinstance(kind, Many) and isinstance(node, ast.Tuple):
             return self.program.packed(kind, list(map(self.as_kind, node.elts, kind.items)))
-        if isinstance(node, ast.IfExp) and self.known(node.test) is None:
+        if isinstance(node, ast.IfExp) and self.constant_value(node.test) is None:
             return f"({self.of(node.test)[0]} ? {self.as_kind(node.body, kind)} : {self.as_kind(node.orelse, kind)})"
         text, own_kind = self.of(node)
         return self.as_real(text, own_kind) if kind == REAL else text
 
     # What is known
 
-    def known(self, node: ast.expr) -> Any:
+    def constant_value(self, node: ast.expr) -> Any:
         """What an expression is worth where that is known beforehand, else None."""
         match node:
             case ast.Constant(value=value):
@@ -97,12 +97,12 @@ class Expressions:
                 return getattr(self._module(name), field)
             case ast.Attribute(value=record, attr=field):
                 kind = self.kind(record)
-                return self.program.known.get((kind.name, field)) if isinstance(kind, NumpyRecord) else None
+                return self.program.fixed_fields.get((kind.name, field)) if isinstance(kind, NumpyRecord) else None
             case ast.Subscript(value=table, slice=index):
-                values, place = self.known(table), self.known(index)
+                values, place = self.constant_value(table), self.constant_value(index)
                 return None if values is None or place is None else float(values[place])
             case ast.UnaryOp(op=sign, operand=operand):
-                value = self.known(operand)
+                value = self.constant_value(operand)
                 return None if value is None else not value if isinstance(sign, ast.Not) else -value
             case ast.Compare() | ast.BoolOp() | ast.Call():
                 return self._known_truth(node)
@@ -111,11 +111,11 @@ class Expressions:
     def _known_truth(self, node: ast.Compare | ast.BoolOp | ast.Call) -> Any:
         match node:
             case ast.Compare(left=left, ops=[sign], comparators=[right]):
-                values = self.known(left), self.known(right)
+                values = self.constant_value(left), self.constant_value(right)
                 return None if None in values else bool(_COMPARE[type(sign)][1](*values))
             case ast.BoolOp(op=sign, values=parts):
                 decides = isinstance(sign, ast.Or)
-                values = [self.known(part) for part in parts]
+                values = [self.constant_value(part) for part in parts]
                 if any(value is not None and bool(value) == decides for value in values):
                     return decides
                 return None if None in values else not decides
@@ -204,7 +204,7 @@ class Expressions:
 
     def _power(self, node: ast.BinOp) -> Typed:
         base, kind = self.of(node.left)
-        if self.known(node.right) == 2:
+        if self.constant_value(node.right) == 2:
             return f"({base} * {base})", kind
         exponent = self.as_real(*self.of(node.right))
         return f"pow{'f' if self.program.single else ''}({self.as_real(base, kind)}, {exponent})", REAL
@@ -216,14 +216,14 @@ class Expressions:
         return self.number(float(text)) if text.isdigit() else f"({self.program.real}){text}"
 
     def _boolop(self, node: ast.BoolOp) -> Typed:
-        if (truth := self.known(node)) is not None:
+        if (truth := self.constant_value(node)) is not None:
             return self.plain(truth)
         sign = " && " if isinstance(node.op, ast.And) else " || "
-        parts = [self.of(value)[0] for value in node.values if self.known(value) is None]
+        parts = [self.of(value)[0] for value in node.values if self.constant_value(value) is None]
         return (parts[0] if len(parts) == 1 else f"({sign.join(parts)})"), BOOL
 
     def _compare(self, node: ast.Compare) -> Typed:
-        if (truth := self.known(node)) is not None:
+        if (truth := self.constant_value(node)) is not None:
             return self.plain(truth)
         sides = [node.left, *node.comparators]
         parts = []
@@ -235,7 +235,7 @@ class Expressions:
         return (parts[0] if len(parts) == 1 else f"({' && '.join(parts)})"), BOOL
 
     def _ifexp(self, node: ast.IfExp) -> Typed:
-        if (truth := self.known(node.test)) is not None:
+        if (truth := self.constant_value(node.test)) is not None:
             return self.of(node.body if truth else node.orelse)
         kind = joined(self.of(node.body)[1], self.of(node.orelse)[1])
         test, body, alternative = self.of(node.test)[0], self.as_kind(node.body, kind), self.as_kind(node.orelse, kind)
@@ -249,7 +249,7 @@ class Expressions:
     def _attribute(self, node: ast.Attribute) -> Typed:
         if isinstance(node.value, ast.Name) and (module := self._module(node.value.id)) is not None:
             return self.plain(float(getattr(module, node.attr)))
-        value = self.known(node)
+        value = self.constant_value(node)
         if isinstance(value, float):
             if not isinstance(node.ctx, ast.Load):
                 raise TranslationError(f"{self.body.source.name}: {ast.unparse(node)} is not constant")
@@ -268,7 +268,7 @@ class Expressions:
         if isinstance(node.slice, ast.Slice):
             return self._slice(node, text, kind)
         indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-        if isinstance(kind, Many) and isinstance(place := self.known(node.slice), int):
+        if isinstance(kind, Many) and isinstance(place := self.constant_value(node.slice), int):
             return f"{text}.a{place}", kind.items[place]
         if isinstance(kind, ColumnTypes):
             return f"{text}[{self.of(indices[0])[0]}]", kind
@@ -282,7 +282,7 @@ class Expressions:
         """Rows of a table, from one that is known to another."""
         part = node.slice
         assert isinstance(part, ast.Slice)
-        bounds = [None if bound is None else self.known(bound) for bound in (part.lower, part.upper)]
+        bounds = [None if bound is None else self.constant_value(bound) for bound in (part.lower, part.upper)]
         unknown = [
             bound for bound, value in zip((part.lower, part.upper), bounds, strict=True) if bound and value is None
         ]
@@ -305,7 +305,7 @@ class Expressions:
     # Calls
 
     def _call(self, node: ast.Call) -> Typed:
-        if (length := self.known(node)) is not None:
+        if (length := self.constant_value(node)) is not None:
             return self.plain(length)
         callee = self._callee(node)
         if (source := source_of(callee)) is not None:

@@ -122,7 +122,7 @@ def _states(bare: bool) -> list[int]:
 
 def _known(numbers: Plant, bare: PlantStage | None) -> dict[tuple[str, str], Any]:
     """What is the same in all records of a plant and of its bare one, and which no solver changes."""
-    known: dict[tuple[str, str], Any] = {("ElementStage", "branch"): OPEN}
+    fixed_fields: dict[tuple[str, str], Any] = {("ElementStage", "branch"): OPEN}
     records = {"Body": [numbers.body], "Element": list(numbers.element)}
     if bare is not None:
         records["Body"] += list(bare.plant.body)
@@ -132,8 +132,8 @@ def _known(numbers: Plant, bare: PlantStage | None) -> dict[tuple[str, str], Any
             first = values[0][field]
             constant = bare is None or field not in CHANGING
             if constant and all(np.array_equal(first, record[field]) for record in values):
-                known[name, field] = float(first) if np.ndim(first) == 0 else np.array(first)
-    return known
+                fixed_fields[name, field] = float(first) if np.ndim(first) == 0 else np.array(first)
+    return fixed_fields
 
 
 def _translated(program: CProgram, rows: int, bare: bool, tol: float) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from omnidyn.control.controller import LARGEST_STATE, LATEST, MOST_BRIDGED
-from omnidyn.control.mpc import interior_point, loop, observer, program
+from omnidyn.control.mpc import interior_point, linear_motion, memory, observer, program, solve
 from omnidyn.control.mpc.controller import LONGEST, Mpc
 from omnidyn.control.mpc.model import (
     BY_MASS,
@@ -101,7 +101,8 @@ def mpc_switches() -> str:
 
 _SWITCHES = """
 /* -DOMNIDYN_MOST_BRIDGED=0: a missing measurement gives zeros. -DOMNIDYN_ELAPSED=0: a step takes OMNIDYN_DT, not the
-   time that passed. -DOMNIDYN_FEW_KNOCKS=0: a loop that swings under pushes may go on. Less code each. */
+   time that passed. -DOMNIDYN_FEW_KNOCKS=0: a loop that swings under pushes may go on. -DOMNIDYN_SWING=0: a loop that
+   swings does not say so. Less code each. */
 #ifndef OMNIDYN_MOST_BRIDGED
 #define OMNIDYN_MOST_BRIDGED @BRIDGED@
 #endif
@@ -110,6 +111,9 @@ _SWITCHES = """
 #endif
 #ifndef OMNIDYN_FEW_KNOCKS
 #define OMNIDYN_FEW_KNOCKS 1
+#endif
+#ifndef OMNIDYN_SWING
+#define OMNIDYN_SWING 1
 #endif"""
 
 
@@ -141,10 +145,10 @@ def _constants(controller: Mpc) -> str:
         "LATE_STEPS": controller.steps_late,
         "PASSES": observer.PASSES,
         "TERMS": TERMS,
-        "SOON": program.COMPARED_STEPS,
+        "SOON": linear_motion.COMPARED_STEPS,
         "AGAIN": settings.again,
-        "FIRST_PASSES": interior_point.FIRST,
-        "LAST_PASSES": interior_point.LAST,
+        "FIRST_PASSES": solve.FIRST,
+        "LAST_PASSES": solve.LAST,
         "MOST": MOST_PASSES,
     }
     numbers = {
@@ -159,16 +163,16 @@ def _constants(controller: Mpc) -> str:
         "TIGHT": FINAL_GAP,
         "LEAST": LEAST_SLACK,
         "NARROWEST": NARROWEST,
-        "TURNED": program.HEADING_CHANGE,
-        "MOVED": program.FRICTION_CHANGE,
-        "PULLED": program.VOLTAGE_CHANGE,
+        "TURNED": linear_motion.HEADING_CHANGE,
+        "MOVED": linear_motion.FRICTION_CHANGE,
+        "PULLED": linear_motion.VOLTAGE_CHANGE,
         "FARTHEST_OFF": observer.OUTLIER_SQUARE,
         "KNOCK": observer.KNOCK_SQUARE,
         "MOST_KNOCKS": observer.MOST_KNOCKS,
         "KNOCK_MEMORY": observer.KNOCK_MEMORY,
         "MOST_SCALE": observer.LARGEST_SCALE,
-        "START_PUSH": loop.START_PUSH,
-        "START_SCALE": loop.START_SCALE,
+        "START_PUSH": memory.START_PUSH,
+        "START_SCALE": memory.START_SCALE,
         "SHARP": settings.volts,
     }
     if ellipse:
@@ -207,7 +211,7 @@ def _matrices(controller: Mpc, linear: np.ndarray) -> dict[str, Any]:
     matrices: dict[str, Any] = {"GAINS": np.concatenate([_square(linear, at) for at in (DECAY, PHI, PSI)])}
     matrices |= {"FEED": _square(linear, FEED), "PUSH": numbers.push.T, "PULL": numbers.pull}
     matrices |= {"WEIGHT": np.array((settings.pose, settings.twist), dtype=float).ravel()}
-    matrices |= {"NEAR": program.STANDSTILL, "HOME": program.HOME, "ARRIVED": program.ARRIVED}
+    matrices |= {"NEAR": linear_motion.STANDSTILL, "HOME": program.HOME, "ARRIVED": program.ARRIVED}
     if len(numbers.levels):
         assert (GX, BY_MASS_GX, SOFT_SPEED) == (0, 3, 9)  # columns that model.c counts by hand
         matrices["LEVEL"] = numbers.levels[:, : SOFT_SPEED + 1]  # what falls with the speed has no C

@@ -40,13 +40,13 @@ class CProgram:
 
     most_turns: of a while loop. One that is cut short makes its function return no number: NAN.
     constants: of modules that are another number here.
-    known: (record, field) -> what it is in all records, which no function changes: it stands in the code as a number.
+    fixed_fields: (record, field) -> what it is in all records, which no function changes: a number in the code.
     """
 
     single: bool = False
     most_turns: int = 16_000
     constants: Mapping[str, float] = field(default_factory=dict)
-    known: Mapping[tuple[str, str], Any] = field(default_factory=dict)
+    fixed_fields: Mapping[tuple[str, str], Any] = field(default_factory=dict)
     structs: dict[str, str] = field(default_factory=dict)
     tables: dict[str, str] = field(default_factory=dict)
     functions: dict[tuple[Any, tuple[Type, ...]], Function] = field(default_factory=dict)

@@ -110,7 +110,9 @@ class FunctionBody:
     def _live(self, statements: list[ast.stmt]) -> Iterator[ast.stmt]:
         """Statements less those that are never reached: behind an end, or on a branch that is known not to be taken."""
         for statement in statements:
-            truth = self.expressions.known(statement.test) if isinstance(statement, ast.If | ast.While) else None
+            truth = (
+                self.expressions.constant_value(statement.test) if isinstance(statement, ast.If | ast.While) else None
+            )
             if truth is None or (truth and isinstance(statement, ast.While)):
                 inner: Iterator[ast.stmt] = iter([statement])
             elif isinstance(statement, ast.If):
@@ -191,7 +193,7 @@ class FunctionBody:
         assert isinstance(loop, ast.Call)
         bounds = loop.args if len(loop.args) > 1 else [ast.Constant(0), *loop.args]
         first, (last, kind) = self.expressions.of(bounds[0])[0], self.expressions.of(bounds[1])
-        by = self.expressions.known(bounds[2]) if len(bounds) > 2 else 1
+        by = self.expressions.constant_value(bounds[2]) if len(bounds) > 2 else 1
         if by not in (1, -1):
             raise self.expressions.refusal(loop)
         before = []
@@ -204,7 +206,7 @@ class FunctionBody:
 
     def _may_change(self, bound: ast.expr, statements: list[ast.stmt]) -> bool:
         """Whether the end of a loop, which Python works out once, is to be kept: statements may change it."""
-        if self.expressions.known(bound) is not None:
+        if self.expressions.constant_value(bound) is not None:
             return False
         nodes = [part for statement in statements for part in ast.walk(statement)]
         stored = {part.id for part in nodes if isinstance(part, ast.Name) and not isinstance(part.ctx, ast.Load)}
@@ -278,7 +280,7 @@ class FunctionBody:
         """a, b = f(...), or the first of what it gives: a, b = f(...)[:2]."""
         count = None
         if isinstance(value, ast.Subscript) and isinstance(value.slice, ast.Slice) and value.slice.lower is None:
-            value, count = value.value, self.expressions.known(value.slice.upper or ast.Constant(None))
+            value, count = value.value, self.expressions.constant_value(value.slice.upper or ast.Constant(None))
         text, kind = self.expressions.of(value)
         name = self._temporary(kind)
         return [f"{name} = {_bare(text)};", *self._put_items(targets, name, kind, count)]

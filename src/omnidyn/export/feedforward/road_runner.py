@@ -43,13 +43,13 @@ def road_runner(robot: Robot, ticks_per_turn: float | None = None, force_guess: 
     lines, inches = [], {"x": INCH, "y": INCH, "yaw": 1.0}
     note = PER_INCH
     if ticks_per_turn is not None:
-        note, way = PER_TICK, ways_per_tick(robot, ticks_per_turn)
+        note, distance_per_tick = PER_TICK, ways_per_tick(robot, ticks_per_turn)
         lines += [
-            f"public double inPerTick = {number(way['x'] / INCH)};",
-            f"public double lateralInPerTick = {number(way['y'] / INCH)};",
-            f"public double trackWidthTicks = {number(1.0 / way['yaw'])};",
+            f"public double inPerTick = {number(distance_per_tick['x'] / INCH)};",
+            f"public double lateralInPerTick = {number(distance_per_tick['y'] / INCH)};",
+            f"public double trackWidthTicks = {number(1.0 / distance_per_tick['yaw'])};",
         ]
-        inches = {"x": way["x"], "y": way["y"], "yaw": 1.0}
+        inches = {"x": distance_per_tick["x"], "y": distance_per_tick["y"], "yaw": 1.0}
     unit = "tick" if ticks_per_turn is not None else "in"
     for row in rows(robot):
         if row.place in AXES:

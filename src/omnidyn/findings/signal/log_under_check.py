@@ -108,11 +108,16 @@ class LogUnderCheck:
         return logged is None or not bool(np.isfinite(logged).any())
 
     def sampled_columns(self, channel: str) -> list[tuple[str, FloatArray]]:
-        """As `columns`, of the components that were sampled in these rows, and so can be judged one by one."""
+        """As `columns`, of the components that were sampled in these rows, and so can be judged one by one.
+
+        The speed that stands in for a dead wheel was not: it is what other channels say.
+        """
         derived = channel == "wheel_speed" and self.derived_speed
+        dead = self.known.get("dead_wheel") if channel == "wheel_speed" else None
         return [
             (name, values)
             for name, values in self.columns(channel)
+            if dead is None or name != components(channel, self.wheels)[dead]
             if self.sampled is None or (name.replace("w", "a") if derived else name) in self.sampled
         ]
 

@@ -16,6 +16,7 @@ from omnidyn.statement import ERROR, NOTE
 
 MEASURED = ("wheel_angle", "wheel_speed", "current", "twist")
 VALUES = 20  # different ones, at least: fewer may agree by chance
+OPPOSITE = -0.9  # correlation of two that turn against each other
 DIFFERENT = 0.1  # of the larger of two inputs, by which they differ
 NOISY = 1e-3  # of the largest value: so much noise is never the same twice
 
@@ -67,11 +68,17 @@ def _reason(work: LogUnderCheck, channel: str, j: int, k: int) -> str:
 
 
 def _differ(values: FloatArray | None, j: int, k: int) -> bool:
-    """Whether two columns differ, over a twentieth of the rows or more."""
+    """Whether two columns differ, over a twentieth of the rows or more, and not by their sign alone.
+
+    Two wheels that turn against each other are equal where the sign of one is wrong: their wiring says that.
+    """
     if values is None or max(j, k) >= values.shape[1]:
         return False
     pair = values[np.isfinite(values[:, [j, k]]).all(axis=1)][:, [j, k]]
     if len(pair) < MIN_ROWS:
         return False
-    apart, size = np.quantile(np.abs(pair[:, 0] - pair[:, 1]), 0.95), np.quantile(np.abs(pair), 0.95)
+    one, other = pair.T
+    if one @ other < OPPOSITE * np.linalg.norm(one) * np.linalg.norm(other):
+        return False
+    apart, size = np.quantile(np.abs(one - other), 0.95), np.quantile(np.abs(pair), 0.95)
     return bool(apart > DIFFERENT * size > 0.0)

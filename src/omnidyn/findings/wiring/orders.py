@@ -166,8 +166,9 @@ def turned(work: LogUnderCheck, reference: FloatArray, second: FloatArray, rate:
 
 def is_turned(turn: Turned) -> bool:
     """Whether a turn is sure, and no matter of noise."""
-    large_turn = turn.alike > TURNED_LIKENESS and abs(turn.angle) > FAR_ANGLE
-    return large_turn or (
+    shows = turn.plain < turn.alike * np.cos(0.5 * turn.angle)
+    large_turn = turn.alike > TURNED_LIKENESS and abs(turn.angle) > FAR_ANGLE and shows
+    return bool(large_turn) or (
         turn.alike > TURNED_LIKENESS and abs(turn.angle) > LEAST_ANGLE and abs(turn.angle) > SURE_ERRORS * turn.error
     )
 

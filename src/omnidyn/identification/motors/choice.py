@@ -93,7 +93,7 @@ def parts_of(run: Run, count: int) -> list[Run]:
 
 # ---- the way that best predicts logs left out
 
-Way = Mapping[str, Any]  # options of fit_motor
+Options = Mapping[str, Any]  # options of fit_motor
 
 WAYS = tuple(
     {"between": between, "latency": latency, "dead_band": dead_band}
@@ -103,19 +103,19 @@ WAYS = tuple(
 
 @dataclass(frozen=True, eq=False)
 class MotorChoice:
-    """way: the options chosen; fit: with them, to all logs; errors: of every way on the logs left out, in the order
+    """options: those chosen; fit: with them, to all logs; errors: of every way on the logs left out, in the order
     tried, infinite where a fit without one of the logs was not possible. comparison: with the simplest of them, of
     blocks of the logs left out; None where it is that.
     """
 
-    way: Way
+    options: Options
     fit: MotorEstimate
-    errors: tuple[tuple[Way, float], ...]
+    errors: tuple[tuple[Options, float], ...]
     comparison: BlockComparison | None = None
 
 
 def choose_motor(
-    runs: Run | Sequence[Run], motor: int = 0, *, ways: Sequence[Way] = WAYS, score: Score = fit_rmse, **shared: Any
+    runs: Run | Sequence[Run], motor: int = 0, *, ways: Sequence[Options] = WAYS, score: Score = fit_rmse, **shared: Any
 ) -> MotorChoice:
     """Fit a motor in the way that best predicts logs left out, one after the other; a single log by parts in time.
 
@@ -126,8 +126,8 @@ def choose_motor(
     """
     logs = as_list(runs)
     left_out = _LeftOut(logs, motor, score)
-    tried = [(way, *left_out.errors({**shared, **way})) for way in ways]
-    possible = [(way, blocks) for way, error, blocks in tried if np.isfinite(error)]
+    tried = [(options, *left_out.errors({**shared, **options})) for options in ways]
+    possible = [(options, blocks) for options, error, blocks in tried if np.isfinite(error)]
     if not possible:
         raise InsufficientDataError(
             "no log can be predicted from the others", got=f"{len(logs)} logs", expected="more, or longer ones"
@@ -138,7 +138,7 @@ def choose_motor(
             best = candidate
     comparison = None if best is simplest else compare_blocks(simplest[1], best[1])
     fit = fit_motor(logs, motor, **{**shared, **best[0]})
-    return MotorChoice(best[0], fit, tuple((way, error) for way, error, _ in tried), comparison)
+    return MotorChoice(best[0], fit, tuple((options, error) for options, error, _ in tried), comparison)
 
 
 class _LeftOut:

@@ -45,8 +45,8 @@ class MotorEstimate:
     """value, std, ci95: slope [unit s/rad], dead_band and offset [unit], lag [s], inertia [unit s^2/rad], and of each
     channel that may be late "latency.CHANNEL" [s]; NaN for what the logs do not determine.
 
-    motor: its number from 0, None for all together. kind, unit: of the input. way: "windows" in integral form, or "free
-    run" of whole logs. correlation: of slope and dead band. rmse [rad/s]: of the speed; of windows, of their mean
+    motor: its number from 0, None for all together. kind, unit: of the input. basis: "windows" in integral form, or
+    "free run" of whole logs. correlation: of slope and dead band. rmse [rad/s]: of the speed; of windows, of their mean
     speed. count: windows, or rows. at_bound, unidentifiable: names. left_out: rows that do not count, because the log
     does not resolve the input there. one_way: it turned one way only, so a dead band and an offset of the input are
     one. held_out [rad/s]: error of free runs on logs that were not fitted. source: the logs. answers: whether its
@@ -60,7 +60,7 @@ class MotorEstimate:
     motor: int | None
     kind: str
     unit: str
-    way: str
+    basis: str
     value: Mapping[str, float]
     std: Mapping[str, float]
     ci95: Mapping[str, tuple[float, float]]
@@ -217,7 +217,7 @@ class MotorEstimate:
         band, (low, high) = BAND in self.value, self.ci95.get(BAND, (math.nan, math.nan))
         return (
             self.name.removeprefix("motor "),
-            f"{self.count} windows" if self.way == WINDOWS else self.way,
+            f"{self.count} windows" if self.basis == WINDOWS else self.basis,
             "yes" if band else "no",
             f"{self.value[SLOPE]:.5g}",
             f"{self.std[SLOPE]:.2g}",
@@ -245,9 +245,9 @@ class MotorEstimate:
         parameters = {
             name: {"value": value, "std": self.std[name], "ci95": self.ci95[name]} for name, value in self.value.items()
         }
-        of_way: dict[str, Any] = (
+        of_basis: dict[str, Any] = (
             {"rest": self.rest, "one_way": self.one_way}
-            if self.way == WINDOWS
+            if self.basis == WINDOWS
             else {
                 "between": self.between,
                 "noise": self.noise,
@@ -257,7 +257,7 @@ class MotorEstimate:
                 "held_out_blocks": None if self.blocks is None else asdict(self.blocks),
             }
         )
-        of_way["rejected"] = {
+        of_basis["rejected"] = {
             name: {"ci95": ends} | ({"blocks": asdict(self.comparisons[name])} if name in self.comparisons else {})
             for name, ends in self.rejected.items()
         }
@@ -266,7 +266,7 @@ class MotorEstimate:
                 "motor": "all" if self.motor is None else self.motor + 1,
                 "unit": self.unit,
                 "travel_unit": self.travel,
-                "from": self.way,
+                "from": self.basis,
                 "count": self.count,
                 "parameters": parameters,
                 "answers": self.answers,
@@ -277,7 +277,7 @@ class MotorEstimate:
                 "unidentifiable": self.unidentifiable,
                 "warnings": self.warnings,
                 "data": self.source,
-                **of_way,
+                **of_basis,
             }
         )
 

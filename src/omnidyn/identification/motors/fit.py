@@ -108,8 +108,8 @@ class MotorFits:
 
     logs: Sequence[MotorLog]
     motor: int
-    fit_by_way: Mapping[str, tuple[Solver[MotorProblem], Solution]]
-    trust_by_way: Mapping[str, Trust]
+    fit_by_reading: Mapping[str, tuple[Solver[MotorProblem], Solution]]
+    trust_by_reading: Mapping[str, Trust]
     resting_input: float
 
     def estimate(self, between: str) -> MotorEstimate:
@@ -117,20 +117,21 @@ class MotorFits:
         _check_between(between)
         logs, motor = self.logs, self.motor
         answers = {
-            way: _answer(*pair, self.trust_by_way[way], logs, motor, way) for way, pair in self.fit_by_way.items()
+            reading: _answer(*pair, self.trust_by_reading[reading], logs, motor, reading)
+            for reading, pair in self.fit_by_reading.items()
         }
-        cost = {way: end.state.objective for way, (_, end) in self.fit_by_way.items()}
-        best_way = between if between != AUTO else min(cost, key=lambda way: cost[way])
-        fit = answers[best_way]
+        cost = {reading: end.state.objective for reading, (_, end) in self.fit_by_reading.items()}
+        best_reading = between if between != AUTO else min(cost, key=lambda reading: cost[reading])
+        fit = answers[best_reading]
         # coloured residuals make every likelihood too steep
-        rise = RISE * max(self.trust_by_way[best_way].widening, 1.0) ** 2
-        for way in cost:
-            if way != best_way and 2.0 * (cost[way] - cost[best_way]) <= rise:
-                fit = _with_rival(fit, answers[way])
+        rise = RISE * max(self.trust_by_reading[best_reading].widening, 1.0) ** 2
+        for reading in cost:
+            if reading != best_reading and 2.0 * (cost[reading] - cost[best_reading]) <= rise:
+                fit = _with_rival(fit, answers[reading])
         if fit.dead_band_seen:
-            solver, solution = self.fit_by_way[best_way]
+            solver, solution = self.fit_by_reading[best_reading]
             fit = _with_bend(fit, bend(solver, solution.state))
-        fit = fit.bounded(turned_under(logs, motor, way=orientation_of(logs, motor)), self.resting_input)
+        fit = fit.bounded(turned_under(logs, motor, orientation=orientation_of(logs, motor)), self.resting_input)
         if BAND not in fit.unidentifiable:
             return fit
         low, high = slope_between(logs, motor, fit.ci95[BAND])  # both go together
@@ -154,18 +155,19 @@ def fit_ways(
     if loss not in (GAUSS, STUDENT):
         raise InputError("unknown loss", got=loss, expected=f"{GAUSS} or {STUDENT}", where="loss")
     logs = logs_of_free_runs(runs, kind)
-    fit_by_way: dict[str, tuple[Solver[MotorProblem], Solution]] = {}
+    fit_by_reading: dict[str, tuple[Solver[MotorProblem], Solution]] = {}
     line = line_numbers(logs, motor) if start is None else start
-    for way in WORDS:
-        problem = motor_problem([motor_record(log, motor, way, angle) for log in logs], dead_band, latency, offset)
+    for reading in WORDS:
+        problem = motor_problem([motor_record(log, motor, reading, angle) for log in logs], dead_band, latency, offset)
         solution = solved(problem, degrees(loss), line, start is None)
-        fit_by_way[way] = solution.solver, solution
+        fit_by_reading[reading] = solution.solver, solution
     # rows of a refined log have no measured neighbours, so that auto would not see whether these resemble
     resting_input = rested_under(logs, motor)
-    trust_by_way = {
-        way: _trusted(*pair, SANDWICH if way == CURVE else AUTO, resting_input) for way, pair in fit_by_way.items()
+    trust_by_reading = {
+        reading: _trusted(*pair, SANDWICH if reading == CURVE else AUTO, resting_input)
+        for reading, pair in fit_by_reading.items()
     }
-    return MotorFits(logs, motor, fit_by_way, trust_by_way, resting_input)
+    return MotorFits(logs, motor, fit_by_reading, trust_by_reading, resting_input)
 
 
 def solved(
@@ -305,7 +307,7 @@ def _answer(
         motor=motor,
         kind=logs[0].kind,
         unit=logs[0].unit,
-        way=FREE_RUN,
+        basis=FREE_RUN,
         between=between,
         value={name: value[name] for name in names},
         std={name: std[name] for name in names},

@@ -93,9 +93,9 @@ def choose_model(
     if not held_out.long_enough:
         return None
     ways = [between] if between != AUTO else list(WORDS)
-    plain_model = min((held_out.model(way, ()) for way in ways), key=lambda model: model.size)
+    plain_model = min((held_out.model(reading, ()) for reading in ways), key=lambda model: model.size)
     model = (
-        min((held_out.model(way, candidate_names) for way in ways), key=lambda model: model.size)
+        min((held_out.model(reading, candidate_names) for reading in ways), key=lambda model: model.size)
         if candidate_names
         else plain_model
     )
@@ -106,9 +106,9 @@ def choose_model(
             model = held_out.model(model.between, _without(model.names, *implausible_names), model.values)
             continue
         smaller_models = [
-            held_out.model(way, _without(model.names, name), model.values)
+            held_out.model(reading, _without(model.names, name), model.values)
             for name in model.names
-            for way in (ways if name == LATENCY else [model.between])  # another reading may be as late
+            for reading in (ways if name == LATENCY else [model.between])  # another reading may be as late
         ]
         best_model = min(smaller_models, key=lambda smaller_model: smaller_model.size)
         comparison = model.beside(best_model)
@@ -136,7 +136,7 @@ class _HeldOut:
 
     def __init__(self, logs: Sequence[MotorLog], motor: int, degrees: float):
         self.degrees, self.line = degrees, line_numbers(logs, motor)
-        self._records = {way: [motor_record(log, motor, way, False) for log in logs] for way in WORDS}
+        self._records = {reading: [motor_record(log, motor, reading, False) for log in logs] for reading in WORDS}
         first = next(iter(self._records.values()))
         self.earliest = earliest(first)
         self.long_enough = sum(_measured(record).sum() for record in first) >= BLOCKS * LEAST_BLOCK
@@ -146,11 +146,11 @@ class _HeldOut:
         values = [value for key, value in model.values.items() if key.partition(".")[0] == name]
         return all(value > 0.0 if name == BAND else value > self.earliest or name == OFFSET for value in values)
 
-    def model(self, way: str, names: Sequence[str], near_values: Mapping[str, float] | None = None) -> MotorModel:
+    def model(self, reading: str, names: Sequence[str], near_values: Mapping[str, float] | None = None) -> MotorModel:
         """The model with these numbers, and how well it predicts what it was not fitted to. near_values: where its fit
         begins, None: where every fit does.
         """
-        records = self._records[way]
+        records = self._records[reading]
         problem = _problem(records, names)
         full_fit = solved(problem, self.degrees, near_values or self.line, near_values is None)
         block, error_limit = (
@@ -179,7 +179,7 @@ class _HeldOut:
         mean = squares.sum(axis=0) / np.maximum(rows.sum(axis=0), 1.0) / spread
         return MotorModel(
             tuple(names),
-            way,
+            reading,
             dict(zip(problem.names, full_fit.state.point.values.tolist(), strict=True)),
             (squares / np.maximum(rows, 1.0) / spread).mean(axis=1),
             float(np.exp(0.5 * np.log(np.maximum(mean, 1e-300)).mean())),

@@ -110,7 +110,7 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
         for key, (number, spread) in wheel_numbers.items():
             robot = wheel.put(robot, key, number)
             value[key], std[key] = number, spread
-            priors[key] = identified(spread, f"motors by {estimate.way}, {estimate.source}")
+            priors[key] = identified(spread, f"motors by {estimate.basis}, {estimate.source}")
     if value:
         robot, notes = _with_map(robot, study, supply)
         remarks += notes

@@ -71,14 +71,16 @@ class _Edge(NamedTuple):
 
 
 def starts_and_stops(
-    logs: Sequence[MotorLog], motor: int, side: float, way: float, lag: float
+    logs: Sequence[MotorLog], motor: int, side: float, orientation: float, lag: float
 ) -> tuple[list[Span], list[Span]]:
     """(starts, stops) of one direction of one motor."""
     if logs[0].kind == CURRENT:
         return [], []
     columns = [
         column._replace(
-            input_values=way * side * column.input_values, speed=side * column.speed, moving=side * column.moving
+            input_values=orientation * side * column.input_values,
+            speed=side * column.speed,
+            moving=side * column.moving,
         )
         for column in _columns(logs, motor)
     ]
@@ -269,13 +271,13 @@ def _rested(column: _MotorRows, lag: float) -> Iterator[float]:
 # ---- steady turning, and steady rest ------------------------------------------------------------------------
 
 
-def turned_under(logs: Sequence[MotorLog], motor: int, side: float = 0.0, way: float = 1.0) -> float:
+def turned_under(logs: Sequence[MotorLog], motor: int, side: float = 0.0, orientation: float = 1.0) -> float:
     """The least input, as a size, under which a motor is seen to turn steadily; infinite where it never is.
 
-    side: +1.0 or -1.0: of its speed, 0.0: either. way: +1.0 where a positive input turns it forward, else -1.0.
+    side: +1.0 or -1.0: of its speed, 0.0: either. orientation: +1.0 where a positive input turns it forward, else -1.0.
     """
     turning_inputs = (
-        way * float(np.sign(window.speed)) * window.input_value + window.error
+        orientation * float(np.sign(window.speed)) * window.input_value + window.error
         for window in _steady(logs, motor)
         if window.turns and side * window.speed >= 0.0
     )

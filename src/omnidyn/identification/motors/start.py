@@ -149,17 +149,17 @@ def motor_starts(
     """Both directions of each motor, as far as the logs show it to turn or to rest there."""
     starts, row = [], max(log.step for log in logs if len(log.t) > 1)
     for motor in motors:
-        way = orientation_of(logs, motor)
+        facing = orientation_of(logs, motor)
         lag_windows = windows_for_a_lag(logs, windows, motor)
         lines = {side: line_one_way(lag_windows, motor, side) for side in (1.0, -1.0)}
         for side, line in lines.items():
             lag = line.value[LAG] if line is not None else math.nan
-            start_spans, stop_spans = starts_and_stops(logs, motor, side, way, lag)
+            start_spans, stop_spans = starts_and_stops(logs, motor, side, facing, lag)
             if start_spans or stop_spans or line is not None:
-                turning_input = turned_under(logs, motor, side, way)
+                turning_input = turned_under(logs, motor, side, facing)
                 starts.append(
                     direction_of(
-                        motor, side, logs[0].unit, start_spans, stop_spans, _numbers(line, way, row), turning_input
+                        motor, side, logs[0].unit, start_spans, stop_spans, _numbers(line, facing, row), turning_input
                     )
                 )
     return tuple(starts)
@@ -222,9 +222,9 @@ def common(spans: Sequence[Span]) -> tuple[Span, bool]:
     return (Span(low.low, high.high), True) if low.low <= high.high else (Span(high.low, low.high), False)
 
 
-def _turned(ends: tuple[float, float], way: float) -> tuple[float, float]:
+def _turned(ends: tuple[float, float], facing: float) -> tuple[float, float]:
     """An interval of the numbers of the other direction."""
-    return ends if way > 0.0 else (-ends[1], -ends[0])
+    return ends if facing > 0.0 else (-ends[1], -ends[0])
 
 
 # ---- the line of one direction ------------------------------------------------------------------------------
@@ -273,7 +273,7 @@ def line_one_way(windows: MotorWindows | None, motor: int, side: float) -> Motor
         return None
 
 
-def _numbers(line: MotorEstimate | None, way: float, row: float) -> dict[str, tuple[float, tuple[float, float]]]:
+def _numbers(line: MotorEstimate | None, facing: float, row: float) -> dict[str, tuple[float, tuple[float, float]]]:
     """Slope, offset and lag of a line, as the direction has them.
 
     The interval of the lag is wider by a row [s], of which the log does not tell: an input that is held from row to
@@ -284,7 +284,7 @@ def _numbers(line: MotorEstimate | None, way: float, row: float) -> dict[str, tu
     lag_low, lag_high = line.ci95[LAG]
     return {
         SLOPE: (line.value[SLOPE], line.ci95[SLOPE]),
-        OFFSET: (way * line.value[BAND], _turned(line.ci95[BAND], way)),
+        OFFSET: (facing * line.value[BAND], _turned(line.ci95[BAND], facing)),
         LAG: (line.value[LAG], (lag_low - row, lag_high + row)),
     }
 
@@ -417,9 +417,9 @@ def starts_of_points(points: MotorTable) -> tuple[MotorStart, ...]:
     for motor in np.unique(points.motor).tolist():
         rows = points.motor == motor
         input_values, speed = points.put_in[rows], points.speed[rows]
-        way = orientation([(input_values, speed)])
+        facing = orientation([(input_values, speed)])
         for side in (1.0, -1.0):
-            level, turns = way * side * input_values, side * sides[rows]
+            level, turns = facing * side * input_values, side * sides[rows]
             start_spans, stop_spans = (
                 _in_order(level, turns, points.run[rows]) if points.run is not None else _in_table(level, turns)
             )
@@ -428,7 +428,7 @@ def starts_of_points(points: MotorTable) -> tuple[MotorStart, ...]:
                 numbers = dict(NO_LINE)
                 if forward.sum() >= LEAST_POINTS:
                     slope, offset = line_of_speed(level[forward], side * speed[forward])
-                    numbers |= {SLOPE: (way * slope[0], _turned(slope[1], way)), OFFSET: offset}
+                    numbers |= {SLOPE: (facing * slope[0], _turned(slope[1], facing)), OFFSET: offset}
                 turning_input = float(level[forward].min(initial=math.inf))
                 starts.append(direction_of(motor, side, points.unit, start_spans, stop_spans, numbers, turning_input))
     return tuple(starts)

@@ -222,8 +222,8 @@ def _curve_of(
     if len(x) < LEAST_LEVELS:
         held_count = len(_by_level(level[level > 0.0], level[level > 0.0], std[level > 0.0])[0])
         return (len(x), held_count) if held_count >= LEAST_LEVELS and not steady.all() else None
-    way = np.sign(input_values[turns])
-    errors_by_side = [_off_line(level[turns][way == side], size[turns][way == side]) for side in (1.0, -1.0)]
+    sides = np.sign(input_values[turns])
+    errors_by_side = [_off_line(level[turns][sides == side], size[turns][sides == side]) for side in (1.0, -1.0)]
     if max(errors_by_side) < NOTABLE_SHARE * top:
         return None  # a line in each direction
     line, neighbours = _left_out(x, y)

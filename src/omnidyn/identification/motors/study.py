@@ -248,7 +248,7 @@ def _lines(logs: Sequence[MotorLog], method: MotorLine) -> MotorStudy:
     lines = tuple(
         line
         if line.motor is None
-        else line.bounded(turned_under(logs, line.motor, way=orientation_of(logs, line.motor)), line.rest)
+        else line.bounded(turned_under(logs, line.motor, orientation=orientation_of(logs, line.motor)), line.rest)
         for line in (_with_misses(line, windows) for line in lines)
     )
     study = MotorStudy(
@@ -267,8 +267,13 @@ def _lines(logs: Sequence[MotorLog], method: MotorLine) -> MotorStudy:
 
 
 def _along(study: MotorStudy, curves_found: Curves) -> MotorStudy:
-    """The study with what is left of the lines of motors whose speed is none."""
+    """The study with what is left of the lines of motors whose speed is none.
+
+    A line whose error over all rows is below that of the curve at the levels left out stays a line.
+    """
+    error_by_motor = {m.motor: m.rmse for m in study.motors}
     curves, notes = curves_found
+    curves = tuple(curve for curve in curves if not error_by_motor.get(curve.motor, math.inf) < curve.neighbours)
     curve_by_motor = {curve.motor: curve for curve in curves}
     bent_names = {f"motor {motor + 1}" for motor in curve_by_motor}
     of_lines = [w for w in study.log_warnings if not (w.code == "dead_bands_apart" and w.subject in bent_names)]

@@ -78,7 +78,7 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
         motor=motor,
         kind=windows.kind,
         unit=windows.unit,
-        way=WINDOWS,
+        basis=WINDOWS,
         source=source,
         count=count,
         value={name: float(draws[0]) for name, draws in numbers.items()},

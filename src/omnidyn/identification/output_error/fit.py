@@ -431,11 +431,11 @@ class Fit:
 
     def _solve_joint(self, nuisances: Sequence[str] | None, progress: FitProgress) -> Solution:
         """The best point of all groups together."""
-        solver = self._solver(nuisances)
+        solver = self.solver(nuisances)
         engine = solver.engine
         start, loop = joint_start(engine, self.nu, progress), self.groups[0].engine.has_loop
         if any(not group.engine.exact for group in self.groups):  # first a step a row
-            coarse_solver = self._solver(nuisances, is_coarse=True)
+            coarse_solver = self.solver(nuisances, is_coarse=True)
             inner_progress = progress.aside("all groups, first a step a row")
             start = coarse_solver.minimise(start, progress=inner_progress).state.point
             if loop:
@@ -445,7 +445,7 @@ class Fit:
         solution = solver.minimise(start, progress=progress)
         return beyond_jumps(solution, progress) if loop else solution
 
-    def _solver(self, nuisances: Sequence[str] | None, is_coarse: bool = False) -> Solver:
+    def solver(self, nuisances: Sequence[str] | None = None, is_coarse: bool = False) -> Solver:
         """The solver of all that is fitted, as exact as at the end of a fit, or `is_coarse`: by a step a row."""
         problems, tol = [group.problem(nuisances) for group in self.groups], None if is_coarse else FINE_TOLERANCE
         if len(problems) == 1:
@@ -460,10 +460,10 @@ class Fit:
         warnings, state = [Statement("interrupted")], best.state
         if state is not None:  # it may be of a part of the logs, or of longer steps
             assert isinstance(state.problem, Problem)
-            solver = self._solver(state.problem.nuisances if self._settles else None)
+            solver = self.solver(state.problem.nuisances if self._settles else None)
             state = solver.state(state.point, state.variance if solver.scaled.any() else None)
         else:
-            solver = self._solver(None)
+            solver = self.solver(None)
             state = solver.minimise(
                 joint_start(solver.engine, self.nu, FitProgress(), best.states_by_group), limit=0
             ).state

@@ -38,13 +38,15 @@ def latencies_like_zero(problem: Problem, values: FloatArray, uncertainty: Trust
     """
     names = [p.name for p in problem.parameters]
     spreads = np.diag(uncertainty.covariance)
-    known = np.flatnonzero(np.isfinite(spreads) & (spreads > 0.0))
-    size = np.sqrt(spreads[known])
-    precision = np.linalg.pinv(uncertainty.covariance[np.ix_(known, known)] / np.outer(size, size), hermitian=True)
+    identified = np.flatnonzero(np.isfinite(spreads) & (spreads > 0.0))
+    size = np.sqrt(spreads[identified])
+    precision = np.linalg.pinv(
+        uncertainty.covariance[np.ix_(identified, identified)] / np.outer(size, size), hermitian=True
+    )
     alone = size / np.sqrt(np.maximum(np.diag(precision), 1.0))  # of each, all others exact
     return tuple(
         names[j]
-        for j, std in zip(known.tolist(), alone.tolist(), strict=True)
+        for j, std in zip(identified.tolist(), alone.tolist(), strict=True)
         if problem.parameters[j].part == LATENCY and 0.0 < abs(values[j]) <= LATENCY_ERRORS * std
     )
 

@@ -391,8 +391,8 @@ def _levels(run: _Run, cut: int) -> list[tuple[float, tuple[float, float]]]:
         assert level_fit is not None
         level, covariance, degrees = level_fit
         base = problem.base[:, :, problem.sizes]
-        way = problem.force[:, :, 0] / np.maximum(np.linalg.norm(problem.force[:, :, 0], axis=1), 1e-300)[:, None]
-        row = np.append(np.einsum("nc,nck->k", way, base) / len(base), 0.0)
+        direction = problem.force[:, :, 0] / np.maximum(np.linalg.norm(problem.force[:, :, 0], axis=1), 1e-300)[:, None]
+        row = np.append(np.einsum("nc,nck->k", direction, base) / len(base), 0.0)
         middle = float(row @ level)
         half = t_quantile(degrees) * float(np.sqrt(row @ covariance @ row))
         levels.append((middle, (middle - half, middle + half)))

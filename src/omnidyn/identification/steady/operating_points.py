@@ -398,8 +398,8 @@ def _commanded(robot: Robot, plateau: Plateau) -> FloatArray | None:
 
 def _direction(robot: Robot, plateau: Plateau, twist: FloatArray) -> FloatArray:
     commanded = _commanded(robot, plateau)
-    way = twist if commanded is None or not commanded.any() else commanded
-    return np.degrees(np.arctan2(way[1], way[0]))
+    direction = twist if commanded is None or not commanded.any() else commanded
+    return np.degrees(np.arctan2(direction[1], direction[0]))
 
 
 def _refuse_unsigned(runs: Sequence[Run], windows: Sequence[Plateau]) -> None:

@@ -157,20 +157,22 @@ def element_speeds(shape: Shape, robot: Robot, points: ForcePoints) -> FloatArra
 
 def _ellipse_force(points: ForcePoints, level: FloatArray) -> FloatArray:
     """(C_x^2 v_x, C_y^2 v_y)/D, D = sqrt(C_x^2 v_x^2 + C_y^2 v_y^2): the gradient of D, as in the model."""
-    way = _unit(points)[:, :2]
-    size = np.sqrt((way**2) @ level**2)[:, None]
-    planar = np.where(size > 0.0, level**2 * way / np.where(size > 0.0, size, 1.0), 0.0)
+    direction = _unit(points)[:, :2]
+    size = np.sqrt((direction**2) @ level**2)[:, None]
+    planar = np.where(size > 0.0, level**2 * direction / np.where(size > 0.0, size, 1.0), 0.0)
     return np.concatenate([planar, np.zeros((len(points), 1))], axis=1)
 
 
 def _ellipse_slope(points: ForcePoints, level: FloatArray) -> FloatArray:
     """d force_a / d C_b = 2 C_b v_b delta_ab / D - C_a^2 v_a C_b v_b^2 / D^3. Shape (points, 3, 2)."""
-    way = _unit(points)[:, :2]
-    size = np.sqrt((way**2) @ level**2)[:, None, None]
+    direction = _unit(points)[:, :2]
+    size = np.sqrt((direction**2) @ level**2)[:, None, None]
     size = np.where(size > 0.0, size, 1.0)
-    pull, turn = level**2 * way, level * way**2
+    pull, turn = level**2 * direction, level * direction**2
     slope = np.zeros((len(points), 3, 2))
-    slope[:, :2] = np.eye(2) * (2.0 * level * way)[:, None, :] / size - pull[:, :, None] * turn[:, None, :] / size**3
+    slope[:, :2] = (
+        np.eye(2) * (2.0 * level * direction)[:, None, :] / size - pull[:, :, None] * turn[:, None, :] / size**3
+    )
     return slope
 
 
@@ -313,7 +315,7 @@ def fit_shape(
         return None
     levels, error = left_out_fit
     deviation = levels - levels.mean(axis=0)
-    way = points.twist[:, :2] / np.where(points.speed > 0.0, points.speed, 1.0)[:, None]
+    direction = points.twist[:, :2] / np.where(points.speed > 0.0, points.speed, 1.0)[:, None]
     return ShapeFit(
         shape=shape,
         keys=keys,
@@ -323,7 +325,7 @@ def fit_shape(
         weight=weight,
         fold=fold,
         error=error,
-        along_error=(error[:, :2] * way).sum(axis=1),
+        along_error=(error[:, :2] * direction).sum(axis=1),
     )
 
 
@@ -384,8 +386,8 @@ class _Problem:
         """What is fitted: all components, or the one along travel. Shape (points, components, ...)."""
         if self.aim == VECTOR:
             return force
-        way = self.points.twist[:, :2] / np.where(self.points.speed > 0.0, self.points.speed, 1.0)[:, None]
-        return np.einsum("nc...,nc->n...", force[:, :2], way)[:, None]
+        direction = self.points.twist[:, :2] / np.where(self.points.speed > 0.0, self.points.speed, 1.0)[:, None]
+        return np.einsum("nc...,nc->n...", force[:, :2], direction)[:, None]
 
     def _table(self, level: FloatArray) -> tuple[FloatArray, FloatArray]:
         wrench, slope = self.shape.table(self.robot, self.points, self.turning, level)

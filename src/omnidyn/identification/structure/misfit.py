@@ -157,7 +157,7 @@ class Gram:
             products += whitened_columns.T @ whitened_columns
             rows += len(whitened_columns)
         size = lengths(products)
-        rows += sum(p.known is not None for p in parameters)
+        rows += sum(p.inner_prior is not None for p in parameters)
         return cls(products / np.outer(size, size), size, rows, len(parameters))
 
     @property
@@ -230,7 +230,7 @@ class _Unexplained:
             j @ weights[:count] + z @ weights[count:] for j, z in zip(slopes, self.columns_by_piece, strict=True)
         ]
         ways = self.linear.without_starts(direction_columns)
-        degrees, explained_squares = self.linear.known(ways), explained_squares / self.linear.rounded(ways)
+        degrees, explained_squares = self.linear.degrees_along(ways), explained_squares / self.linear.rounded(ways)
         known_directions = degrees >= LEAST_DEGREES
         if not known_directions.any():
             return 0.0, 1.0, 0

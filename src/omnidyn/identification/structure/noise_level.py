@@ -198,26 +198,26 @@ def _both_ways(plain_test: _Test | None, white: _Test | None) -> _Test | None:
 def _held(windows: Shown, memory: AutoRegression) -> _Test | None:
     if windows.held_windows.several < FEW_HOLDS or windows.busy.several < FEW_HOLDS:
         return None
-    way = _Way.of(windows.held_windows.values.shape[1], PARABOLA, memory)
+    trend = _Trend.of(windows.held_windows.values.shape[1], PARABOLA, memory)
 
-    def test(way: _Way) -> _Test | None:
+    def test(trend: _Trend) -> _Test | None:
         """What is left in motion beside the scatter of holds, both seen this way."""
-        held_power, busy = way.power(windows.held_windows), way.power(windows.busy)
+        held_power, busy = trend.power(windows.held_windows), trend.power(windows.busy)
         mean_square = (held_power.squares.sum() + busy.squares.sum()) / (
             (held_power.counts.sum() + busy.counts.sum()) * held_power.numbers
         )
-        return _test(held_power, busy, float(mean_square), way.rows, way.removed_degrees)
+        return _test(held_power, busy, float(mean_square), trend.rows, trend.removed_degrees)
 
-    return _both_ways(test(way), test(way.white(memory)) if memory.remembers else None)
+    return _both_ways(test(trend), test(trend.white(memory)) if memory.remembers else None)
 
 
 def _rested(windows: Shown) -> _Test | None:
     moving, resting = windows.held_windows + windows.busy, windows.resting
     if not len(resting.values) or not len(moving.values):
         return None
-    way = _Way.of(moving.values.shape[1], PARABOLA, None)
-    rest_power, motion_power = way.power(resting), way.power(moving)
-    rest_test = _test(rest_power, motion_power, motion_power.mean, way.rows, way.removed_degrees)
+    trend = _Trend.of(moving.values.shape[1], PARABOLA, None)
+    rest_power, motion_power = trend.power(resting), trend.power(moving)
+    rest_test = _test(rest_power, motion_power, motion_power.mean, trend.rows, trend.removed_degrees)
     sensor_steps = max(sensor_step(window) for window in (*resting.values, resting.values.ravel()))
     return None if rest_test is None or sensor_steps > rest_test.level else rest_test
 
@@ -228,32 +228,32 @@ def _repeated(windows: Shown, memory: AutoRegression, counts_on: bool) -> _Test 
         return None
     lags = memory.autocovariance(min(windows.row_gap, FOLLOWED_ROWS) + 1)
     is_forgotten = abs(lags[-1]) < FORGOTTEN_CORRELATION * lags[0] and not memory.adds_up and not counts_on
-    way = _Way.of(windows.repeat_windows.values.shape[1], NO_TREND if is_forgotten else PARABOLA, memory)
+    trend = _Trend.of(windows.repeat_windows.values.shape[1], NO_TREND if is_forgotten else PARABOLA, memory)
     if (
         is_forgotten
-        and way.window_degrees * (len(windows.repeat_windows.groups) - windows.repeat_windows.several) < SLOW_DEGREES
+        and trend.window_degrees * (len(windows.repeat_windows.groups) - windows.repeat_windows.several) < SLOW_DEGREES
     ):  # too few to know slow errors
-        way = _Way.of(way.rows, PARABOLA, memory)
+        trend = _Trend.of(trend.rows, PARABOLA, memory)
 
-    def test(way: _Way) -> _Test | None:
+    def test(trend: _Trend) -> _Test | None:
         """What repeats have in common beside what they differ by, both seen this way."""
-        repeat_values, groups = way.seen(windows.repeat_windows.values), windows.repeat_windows.groups
+        repeat_values, groups = trend.seen(windows.repeat_windows.values), windows.repeat_windows.groups
         repeat_counts = _summed(groups, np.ones(len(groups)))
         mean = np.stack([_summed(groups, column) for column in repeat_values.T], axis=1) / repeat_counts[:, None]
         common_squares = repeat_counts * (mean**2).sum(axis=1)
         all_squares = _summed(groups, (repeat_values**2).sum(axis=1))
         apart_power, alike_power = (
-            _Power(squares, count, repeat_values.shape[1], way.window_degrees)
+            _Power(squares, count, repeat_values.shape[1], trend.window_degrees)
             for squares, count in (
                 (all_squares - common_squares, repeat_counts - 1.0),
                 (common_squares, np.ones_like(repeat_counts)),
             )
         )
         return _test(
-            apart_power, alike_power, float(all_squares.sum() / repeat_values.size), way.rows, way.removed_degrees
+            apart_power, alike_power, float(all_squares.sum() / repeat_values.size), trend.rows, trend.removed_degrees
         )
 
-    return _both_ways(test(way), test(way.white(memory)) if memory.remembers else None)
+    return _both_ways(test(trend), test(trend.white(memory)) if memory.remembers else None)
 
 
 def _neighbours(rows: FitRows, c: int, memory: AutoRegression) -> _Test | None:
@@ -325,7 +325,7 @@ def _taken(rows: FitRows) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Way:
+class _Trend:
     """How windows are looked at: along `ways` (L, d), orthonormal, with polynomials taken out, `removed_degrees` of
     them, once `memory` has made the rows white. window_degrees: degrees of freedom of a window."""
 
@@ -339,7 +339,7 @@ class _Way:
         return len(self.ways)
 
     @classmethod
-    def of(cls, rows: int, degree: int, memory: AutoRegression | None) -> _Way:
+    def of(cls, rows: int, degree: int, memory: AutoRegression | None) -> _Trend:
         """Of rows as they are, which have this memory."""
         ways = _beside(_polynomials(rows, degree))
         numbers = float(ways.shape[1])
@@ -354,10 +354,10 @@ class _Way:
         window_covariance = ways.T @ covariance @ ways
         return cls(ways, degree + 1, float(np.trace(window_covariance) ** 2 / (window_covariance**2).sum()))
 
-    def white(self, memory: AutoRegression) -> _Way:
+    def white(self, memory: AutoRegression) -> _Trend:
         """The same of rows made white."""
         ways = _beside(_through(memory, _polynomials(self.rows, self.removed_degrees - 1)))
-        return _Way(ways, self.removed_degrees, float(ways.shape[1]), memory)
+        return _Trend(ways, self.removed_degrees, float(ways.shape[1]), memory)
 
     def seen(self, values: FloatArray) -> FloatArray:
         """Windows (m, L) along these ways, (m, d)."""

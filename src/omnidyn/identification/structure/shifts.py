@@ -74,25 +74,27 @@ class _Look:
         self.problem, self.values = linear.rows.problem, linear.rows.point.values
         self.prior, self.pull = _known(self.problem, self.values, self.blocks.size)
         whole_matrix = self.blocks.part(np.ones((len(self.blocks.products), BLOCKS), dtype=bool))
-        self.told, self.shared = _told(whole_matrix, self.problem, self.values, self.prior)
+        self.identified, self.shared = _told(whole_matrix, self.problem, self.values, self.prior)
 
     def stability(self) -> Stability:
         """All comparisons."""
-        if not len(self.told):
+        if not len(self.identified):
             return Stability({}, ())
         logs = len(self.blocks.records)
         cuts = [self._moment(None)]
         if 1 < logs <= MOST_LOGS:
             cuts += [self._moment(log) for log in range(logs)]
-        tests = (len(self.told) + 1) * sum(len(cut) for cut in cuts)
+        tests = (len(self.identified) + 1) * sum(len(cut) for cut in cuts)
         moments = [split for log, cut in enumerate(cuts, -1) if (split := self._split_at(cut, log, tests))]
         p_by_kind = {TIME: self._least([comparison for cut in cuts for comparison in cut.values()], tests)}
         splits = sorted(moments, key=lambda split: split.p)[:1]
         if logs > 1:
             log_comparison = self._compared([self.blocks.log[:, None] == log for log in range(logs)])
-            p_by_kind[LOGS] = self._least([log_comparison], len(self.told) + 1)
+            p_by_kind[LOGS] = self._least([log_comparison], len(self.identified) + 1)
             names = [record.source or f"log {k + 1}" for k, record in enumerate(self.blocks.records)]
-            split = self._split(log_comparison, LOGS, names, len(self.told) + 1, "", (np.nan, (np.nan, np.nan)), np.nan)
+            split = self._split(
+                log_comparison, LOGS, names, len(self.identified) + 1, "", (np.nan, (np.nan, np.nan)), np.nan
+            )
             splits += [split] if split else []
         likely_share = max(cuts[0], key=lambda cut: cuts[0][cut].joint[1]) / BLOCKS
         return Stability(p_by_kind, tuple(splits), (likely_share,))
@@ -111,7 +113,7 @@ class _Look:
         """Numbers of parts, each compared, and all together."""
         masks = [np.broadcast_to(blocks_of_part, (len(self.blocks.products), BLOCKS)) for blocks_of_part in masks]
         parts = [self.blocks.part(finite_parts) for finite_parts in masks]
-        steps, covariance = apart(parts, self.told, self.shared, self.prior, self.pull)
+        steps, covariance = apart(parts, self.identified, self.shared, self.prior, self.pull)
         k, t = steps.shape
         unknown_numbers = ~np.isfinite(np.diag(covariance)).reshape(k, t)
         ratio, degrees = self._scatter(masks, steps, covariance)
@@ -138,13 +140,15 @@ class _Look:
         No memory makes rounding of a slow wheel white. What a block pulls is seen once its part is fitted for itself,
         so that what differs between the parts has no share in it.
         """
-        t = len(self.told)
+        t = len(self.identified)
         squares, expected = [], np.zeros(t)
         for k, mask in enumerate(masks):
             indices = slice(k * t, (k + 1) * t)
             known_covariance = np.where(np.isfinite(covariance[indices, indices]), covariance[indices, indices], 0.0)
             gradient, information = self.blocks.scores(mask)
-            residual_gradient = gradient[:, self.told] - information[:, self.told][:, :, self.told] @ steps[k]
+            residual_gradient = (
+                gradient[:, self.identified] - information[:, self.identified][:, :, self.identified] @ steps[k]
+            )
             squares.append(residual_gradient @ known_covariance)
             expected += np.diag(known_covariance)
         all_squares = np.concatenate(squares)
@@ -236,7 +240,9 @@ class _Look:
             return None
         shifts = [
             Shift(
-                self.problem.parameters[self.told[j]].name, tuple(self._levels(comparison, j, names)), float(tests * p)
+                self.problem.parameters[self.identified[j]].name,
+                tuple(self._levels(comparison, j, names)),
+                float(tests * p),
             )
             for j, p in enumerate(comparison.p.tolist())
             if tests * p <= FALSE_SHARE
@@ -256,7 +262,7 @@ class _Look:
     @np.errstate(over="ignore")  # a part that hardly tells a number: it may be anything up to infinity
     def _levels(self, comparison: _Compared, j: int, names: Sequence[str]) -> list[Level]:
         """What a number is in each part that tells it."""
-        p, parameter_index, t = self.problem.parameters[self.told[j]], self.told[j], len(self.told)
+        p, parameter_index, t = self.problem.parameters[self.identified[j]], self.identified[j], len(self.identified)
         quantile, inner_value = t_quantile(self.linear.degrees), p.inner(float(self.values[parameter_index]))
         levels = []
         for k, name in enumerate(names):
@@ -273,8 +279,8 @@ def _known(problem: Problem, values: FloatArray, size: FloatArray) -> tuple[Floa
     """(information (P,), gradient (P,)) of what is known beforehand, in columns divided by `size`."""
     prior, pull = np.zeros(len(size)), np.zeros(len(size))
     for j, (p, value) in enumerate(zip(problem.parameters, values.tolist(), strict=True)):
-        if p.known is not None:
-            mean, std = p.known
+        if p.inner_prior is not None:
+            mean, std = p.inner_prior
             prior[j], pull[j] = std**-2 / size[j] ** 2, (mean - p.inner(value)) / std**2 / size[j]
     return prior, pull
 

@@ -114,7 +114,8 @@ def calmer(misfit_result: Misfit, outliers_by_output: Mapping[str, Wild]) -> tup
         first = solved(columns[other_rows], e[other_rows])
         ways = first, _students(columns[other_rows], e[other_rows], first, scale)
         plain_loss, robust_loss = (
-            float(huber_loss((e[block_rows] - columns[block_rows] @ way) ** 2, bound).sum()) for way in ways
+            float(huber_loss((e[block_rows] - columns[block_rows] @ coefficients) ** 2, bound).sum())
+            for coefficients in ways
         )
         plain_losses.append(plain_loss)
         robust.append(robust_loss)

@@ -4,8 +4,8 @@
     envs = gymnasium.make_vec("omnidyn/Velocity-v0", num_envs=4096, robot="axebot")
 
 vector: RobotVectorEnv; single: RobotEnv, of one robot; checker: check_vector_env, for vector environments of anybody;
-adapters: Stable-Baselines3, rsl_rl, PyTorch; runs: a Run of one robot under a policy. What they do is written in
-`omnidyn.simulation.environments`.
+adapters: Stable-Baselines3, rsl_rl, PyTorch; runs: a Run of one robot under a policy; drawing: frames of a video. What
+they do is written in `omnidyn.simulation.environments`.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ _HOME = {
     "RobotEnv": "omnidyn.interop.gymnasium.single",
     "RobotVectorEnv": "omnidyn.interop.gymnasium.vector",
     "check_vector_env": "omnidyn.interop.gymnasium.checker",
+    "policy_of_sb3": "omnidyn.interop.gymnasium.adapters",
     "rollout": "omnidyn.interop.gymnasium.runs",
     "rsl_rl_env": "omnidyn.interop.gymnasium.adapters",
     "sb3_env": "omnidyn.interop.gymnasium.adapters",

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.control.feedforward import DT
+from omnidyn.control.policy import PolicyFile, policy_of
 from omnidyn.errors import InputError, MissingExtraError
 from omnidyn.interop.gymnasium.vector import RobotVectorEnv
 
@@ -51,6 +53,7 @@ def sb3_env(envs: RobotVectorEnv) -> Any:
             for robot in np.flatnonzero(terminated | truncated):
                 words[robot]["TimeLimit.truncated"] = bool(truncated[robot] and not terminated[robot])
                 words[robot]["terminal_observation"] = infos["final_obs"][robot]
+                words[robot]["is_success"] = bool(infos["final_info"]["success"][robot])
             return np.array(observation), np.array(reward), terminated | truncated, words
 
         def close(self) -> None:
@@ -73,6 +76,34 @@ def sb3_env(envs: RobotVectorEnv) -> Any:
 
 def _all(indices: Any) -> Any:
     return slice(None) if indices is None else np.atleast_1d(indices)
+
+
+def policy_of_sb3(model: Any, task: str, dt: float = DT) -> PolicyFile:
+    """The policy of a trained PPO or A2C of Stable-Baselines3, which `omnidyn track --controller` drives.
+
+    What VecNormalize does to observations, z = (x - mean)/sqrt(var + epsilon), is folded into the first layer:
+    W z + b = (W/s) x + (b - W mean/s). That it clips them, at 10 by default, is left out.
+    Raises InputError for a network of other layers than Linear and Tanh.
+    """
+    head, trunk = getattr(model.policy, "action_net", None), getattr(model.policy, "mlp_extractor", None)
+    if head is None or trunk is None:
+        got = f"{type(model).__name__} of {type(model.policy).__name__}"
+        raise InputError("no such policy", got=got, expected='PPO or A2C of "MlpPolicy"', where="model")
+    modules = [*trunk.policy_net, head]
+    kinds = [type(module).__name__ for module in modules]
+    if kinds != ["Linear", "Tanh"] * (len(kinds) // 2) + ["Linear"]:
+        got, expected = ", ".join(kinds), "Linear and Tanh by turns, as MlpPolicy has it by default"
+        raise InputError("no network with tanh", got=got, expected=expected, where="model")
+    layers = [
+        (module.weight.detach().cpu().numpy().astype(float), module.bias.detach().cpu().numpy().astype(float))
+        for module in modules[::2]
+    ]
+    normalised = model.get_vec_normalize_env()
+    if normalised is not None and normalised.norm_obs:
+        moments, (weight, bias) = normalised.obs_rms, layers[0]
+        scaled = weight / np.sqrt(np.asarray(moments.var) + normalised.epsilon)
+        layers[0] = scaled, bias - scaled @ np.asarray(moments.mean)
+    return policy_of(layers, task, dt)
 
 
 def torch_env(envs: RobotVectorEnv) -> Any:

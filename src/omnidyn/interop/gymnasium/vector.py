@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -11,15 +12,19 @@ from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from omnidyn.arguments import unknown_option
 from omnidyn.arrays import FloatArray
 from omnidyn.control.paths.path import path as path_named
 from omnidyn.errors import InputError
+from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.batch.sample import Sample
-from omnidyn.simulation.environments.environments import Environments, Setting
+from omnidyn.simulation.environments.environments import SPREAD, Environments, Setting
 from omnidyn.simulation.environments.layout import PREVIEW
 
+OPTIONS = ("goal", "start", "twist")  # of a reset
+RENDER_MODES = ("rgb_array",)
 LARGEST = 1e3  # of what is observed: no robot of this size gets there within an episode
 Robots = str | os.PathLike | Robot | Sequence[Robot] | Sample
 
@@ -27,8 +32,10 @@ Robots = str | os.PathLike | Robot | Sequence[Robot] | Sample
 class RobotVectorEnv(VectorEnv):
     """Robots at one task. Actions are shares of the largest voltage, -1 to 1; one that is no number is 0.
 
-    A robot has the same bits in a batch of any size, on any number of threads and after any reset of others. `reset`
-    takes a `reset_mask` in its options in every mode.
+    Behind a speed loop they are shares of the largest wheel speed. A robot has the same bits in a batch of any size, on
+    any number of threads and after any reset of others. `reset` takes a `reset_mask` in its options in every mode, and
+    `goal`, `start` and `twist`, as of `Environments.reset`. infos hold the terms of the reward, and success. A subclass
+    may write `judge`, for a reward or an end of its own.
 
     Args:
         num_envs: Number of environments.
@@ -39,6 +46,7 @@ class RobotVectorEnv(VectorEnv):
         autoreset_mode: Of Gymnasium.
         copy: Whether observations are copied; without, the next step writes into the same array.
         privileged: Whether infos hold what no sensor shows, as "privileged", see `Environments.privileged`.
+        render_mode: None, or "rgb_array": `render` gives a picture of each robot.
         dtype: Of all numbers, float32 or float64.
         threads: That share a step.
         seed: Of robots that are drawn beforehand.
@@ -57,24 +65,27 @@ class RobotVectorEnv(VectorEnv):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         copy: bool = True,
         privileged: bool = False,
+        render_mode: str | None = None,
         dtype: Any = np.float32,
         threads: int = 1,
         seed: int = 0,
         **setting: Any,
     ) -> None:
         mode = _mode(autoreset_mode)
-        self.metadata = {"render_modes": [], "autoreset_mode": mode}
+        self.render_mode = check_render_mode(render_mode)
         self.copy, self.privileged, self.num_envs = copy, privileged, num_envs
         self.environments = environments(
             robot,
             num_envs,
-            Setting(task=task, **setting),
+            made_setting(task, setting),
             path,
             autoreset=mode.name.lower(),
             dtype=dtype,
             threads=threads,
             seed=seed,
+            poses=render_mode is not None,
         )
+        self.metadata = {**metadata_of(self.environments), "autoreset_mode": mode}
         self.single_observation_space, self.single_action_space = spaces(self.environments)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -83,11 +94,11 @@ class RobotVectorEnv(VectorEnv):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
         """Begin an episode of all robots, or of those in `options["reset_mask"]`. See VectorEnv."""
-        mask = None if options is None else options.get("reset_mask")
+        mask, placed = None if options is None else options.get("reset_mask"), placed_by(options, ("reset_mask",))
         if mask is not None and not np.any(mask):
             raise InputError("nobody to reset", got="a mask of False", expected="one True or more", where="reset_mask")
         super().reset(seed=seed)
-        observation = self.environments.reset(mask, seed_of(self, seed))
+        observation = self.environments.reset(mask, seed_of(self, seed), **placed)
         return self._shown(observation), self._infos()
 
     def step(  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -95,13 +106,32 @@ class RobotVectorEnv(VectorEnv):
     ) -> tuple[FloatArray, FloatArray, Any, Any, dict[str, Any]]:
         """Hold actions for dt, shape (num_envs, wheels). See VectorEnv."""
         observation, reward, terminated, truncated = self.environments.step(actions)
-        infos = self._infos()
+        infos = self._infos() | self._terms()
         if self.environments.autoreset == "same_step" and (over := terminated | truncated).any():
-            infos |= self._final(over)
+            infos |= self._final(over, infos)
         flags = (reward, terminated, truncated)
         if self.copy:
             flags = (reward.copy(), terminated.copy(), truncated.copy())
-        return self._shown(observation), *flags, infos
+        return self._judged(self._shown(observation), *flags, infos, actions)
+
+    def judge(
+        self, observation: FloatArray, reward: FloatArray, terminated: Any, actions: Any, infos: dict[str, Any]
+    ) -> tuple[FloatArray, Any]:
+        """(rewards, which episodes end), for a subclass to write: as they are. Shapes (num_envs, ..) and (num_envs,).
+
+        An end of its own begins the next episode as `autoreset_mode` says; not of SAME_STEP, which has begun it.
+        """
+        return reward, terminated
+
+    def _judged(self, observation: FloatArray, reward: Any, terminated: Any, truncated: Any, infos: Any, actions: Any):
+        own_reward, own_end = self.judge(observation, reward, terminated, actions, infos)
+        if (ended := np.asarray(own_end, np.bool_) & ~terminated).any():
+            self.environments.end(ended)
+        return observation, own_reward, terminated | ended, truncated, infos
+
+    def render(self) -> tuple[Any, ...] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """A picture of each robot, (256, 256, 3) uint8. None without a render mode."""
+        return None if self.render_mode is None else tuple(pictures(self.environments))
 
     def close_extras(self, **options: Any) -> None:
         """Let go of threads."""
@@ -115,13 +145,21 @@ class RobotVectorEnv(VectorEnv):
             return {}
         return {"privileged": self.environments.privileged, "_privileged": np.ones(self.num_envs, np.bool_)}
 
-    def _final(self, over: Any) -> dict[str, Any]:
+    def _terms(self) -> dict[str, Any]:
+        """The terms of the reward, and success."""
+        terms, there = self.environments.terms, np.ones(self.num_envs, np.bool_)
+        shown = {name: value.copy() if self.copy else value for name, value in terms.items()}
+        return shown | {f"_{name}": there for name in terms}
+
+    def _final(self, over: Any, infos: dict[str, Any]) -> dict[str, Any]:
         """The end of episodes whose next one has begun in the same step, as SyncVectorEnv shows it."""
         final = np.full(self.num_envs, None, dtype=object)
         rows = self.environments.final
         for robot in np.flatnonzero(over):
             final[robot] = rows[robot].copy()
-        return {"final_obs": final, "_final_obs": over, "final_info": {}, "_final_info": over.copy()}
+        last = {name: infos[name].copy() for name in self.environments.terms}
+        last |= {f"_{name}": over.copy() for name in self.environments.terms}
+        return {"final_obs": final, "_final_obs": over, "final_info": last, "_final_info": over.copy()}
 
 
 def _mode(mode: AutoresetMode | str) -> AutoresetMode:
@@ -139,6 +177,52 @@ def seed_of(env: Any, seed: int | None) -> int | None:
     return seed
 
 
+def check_render_mode(mode: str | None) -> str | None:
+    """Raises InputError for a render mode that there is not."""
+    if mode is not None and mode not in RENDER_MODES:
+        raise InputError("unknown render mode", got=mode, expected="rgb_array, or None", where="render_mode")
+    return mode
+
+
+def made_setting(task: str, options: dict[str, Any]) -> Setting:
+    """The setting of options. Raises InputError for one that there is not, with the nearest."""
+    names = [field.name for field in fields(Setting)]
+    for name in options:
+        if name not in names:
+            raise unknown_option("an environment", name, names, "environment")
+    return Setting(**{"task": task, **options})
+
+
+def placed_by(options: dict[str, Any] | None, others: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Goal, start and twist of the options of a reset. Raises InputError for an option that there is not."""
+    for name in options or {}:
+        if name not in (*OPTIONS, *others):
+            raise unknown_option("a reset", name, (*OPTIONS, *others), "options")
+    return {name: value for name, value in (options or {}).items() if name in OPTIONS}
+
+
+def metadata_of(envs: Environments) -> dict[str, Any]:
+    """What Gymnasium wants to know."""
+    return {"render_modes": list(RENDER_MODES), "render_fps": max(1, round(1.0 / envs.setting.dt))}
+
+
+def pictures(envs: Environments) -> Iterator[Any]:
+    """A picture of each robot; in the task "velocity" it stays in the middle, and the floor moves."""
+    from omnidyn.interop.gymnasium.drawing import Scene
+
+    setting, path = envs.setting, envs.numbers.path.astype(float)
+    scene, size = None, 3.0 * float(np.mean(envs.robot.wheels.robot_radius))
+    if setting.task == "path":
+        low, high = path[:, :2].min(axis=0), path[:, :2].max(axis=0)
+        scene = Scene(envs.robot, 0.5 * (low + high), 0.5 * float((high - low).max()) + size, path[:, :2])
+    elif setting.task == "pose":
+        scene = Scene(envs.robot, np.zeros(2), float(max((setting.spread or SPREAD["pose"])[:2])) + size)
+    for pose, goal in zip(envs.pose.astype(float), envs.goal.astype(float), strict=True):
+        if setting.task == "velocity":
+            scene = Scene(envs.robot, pose[:2], 1.0)
+        yield scene.draw(pose, goal if setting.task == "pose" else None)
+
+
 def spaces(envs: Environments) -> tuple[Box, Box]:
     """(of observations, of actions) of one environment."""
     kind: Any = envs.dtype.type
@@ -149,8 +233,9 @@ def environments(robot: Robots, count: int, setting: Setting, path: Any, **optio
     """The environments of robots by name, path, value or sample, and of a path by name, file or value."""
     robots: Any = load_robot(robot) if isinstance(robot, str | os.PathLike) else robot
     if isinstance(robot, Sample):
-        robots = list(robot) if robot.parameters is None else robot.center
-        options["parameters"] = robot.parameters
+        alone = robot.parameters is None or robot.center.drive.kind == SPEED
+        robots = list(robot) if alone else robot.center
+        options["parameters"] = None if alone else robot.parameters
     rows = path_rows(path, setting) if setting.task == "path" else None
     return Environments(robots, count, setting, path=rows, **options)
 

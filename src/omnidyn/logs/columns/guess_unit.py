@@ -23,6 +23,7 @@ FAR_BEYOND = 4.0  # times the limit of a robot: more are no volts
 FULL_SCALES = (255, 1000, 1023, 4095, 10_000, 16_383, 32_767, 65_535)  # of a PWM: so many are full duty
 SERVO = (800.0, 2200.0)  # [us] widths of pulses
 NEAR_A_TURN = 300.0  # [deg] an angle that starts over after a turn comes as near to it
+MORE_THAN_A_TURN = 6.5  # [rad] an angle within -pi to pi, or 0 to 2 pi, has jumps where it starts over
 FEW_VALUES = 10  # whole numbers beyond so many different ones are counts
 FASTEST_TURN = 35.0  # [rad/s] of a body: the 2000 deg/s at which gyroscopes end
 SI = {"rad_s": "rad/s", "m_s": "m/s"}
@@ -31,7 +32,7 @@ SI = {"rad_s": "rad/s", "m_s": "m/s"}
 def unit_of(table: FileTable, name: str, component: str, robot: Robot | None, guess: Guess) -> Unit | None:
     """The unit where the file gives none: SI, said in words; volts only where they cannot be a duty."""
     suffix = si_suffix(component)
-    if suffix == "rad" and _turns_in_degrees(floats(table.columns[name])):
+    if suffix == "rad" and _turns_in_degrees(component, floats(table.columns[name])):
         guess.doubts.append(doubt(name, component, "turns_in_degrees", ("deg",)))
         return None
     if suffix in ("V", "duty") and component != "supply":
@@ -53,7 +54,8 @@ def implausible(
 
     is_declared: whether the user said the unit: what is only unlikely is then believed. is_given: whether the file did.
     """
-    if quantity_of(component) == ANGLE and unit == parse_unit("rad") and not is_declared and _turns_in_degrees(values):
+    is_rad = quantity_of(component) == ANGLE and unit == parse_unit("rad")
+    if is_rad and not is_declared and _turns_in_degrees(component, values):
         return doubt("", component, "turns_in_degrees", ("deg",), unit="rad")
     if component[0] not in "ud" or not component[1:].isdigit():
         return None if is_declared else beyond_range(component, unit, values, voltage_limit(robot), is_given)
@@ -100,13 +102,18 @@ def doubt_of_rate(table: FileTable, name: str, component: str, unit: str = "") -
     return doubt(name, component, "turn_rate_too_large", ("deg/s", "rad/s"), largest=largest, unit=unit)
 
 
-def _turns_in_degrees(values: FloatArray) -> bool:
-    """Whether an angle without a unit stays within a turn of 360 and jumps back or forth by more than half of it."""
+def _turns_in_degrees(component: str, values: FloatArray) -> bool:
+    """Whether an angle without a unit jumps as one in degrees: by more than half of 360 within a turn.
+
+    Or, of the heading, over more than a turn of 2 pi, by more than half of that in one row of a hundred: a robot that
+    turns so fast cannot be followed from row to row.
+    """
     angles = values[np.isfinite(values)]
     if len(angles) < 2:
         return False
-    width, jump = float(np.ptp(angles)), float(np.abs(np.diff(angles)).max())
-    return NEAR_A_TURN < width <= 361.0 and jump > 180.0
+    width, jumps = float(np.ptp(angles)), np.abs(np.diff(angles))
+    too_fast = component == "heading" and width > MORE_THAN_A_TURN and float(np.quantile(jumps, 0.99)) > np.pi
+    return too_fast or (NEAR_A_TURN < width <= 361.0 and float(jumps.max()) > 180.0)
 
 
 def _are_counts(values: FloatArray) -> bool:

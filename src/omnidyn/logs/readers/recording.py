@@ -16,6 +16,7 @@ from omnidyn.logs.table.dialect import MAX_NAME
 from omnidyn.logs.table.header import MAX_COLUMNS
 from omnidyn.logs.table.rows import Column, refuse_infinite
 from omnidyn.logs.table.table import MAX_CELLS, Declaration, FileTable
+from omnidyn.statement import Statement
 
 TIME_COLUMN = "t_s"
 DAY_NS = 86_400 * 10**9
@@ -72,7 +73,7 @@ class Recording:
     topics: list[Topic]
     source: str
     sha256: str = ""
-    notes: list[str] = field(default_factory=list)
+    notes: list[Statement | str] = field(default_factory=list)
     salvaged: int | None = None
 
     def tables(self, rows: int) -> Iterator[FileTable]:

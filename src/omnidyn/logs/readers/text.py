@@ -29,7 +29,7 @@ from omnidyn.logs.table import dialect
 from omnidyn.logs.table.header import MAX_COLUMNS, TABS_NOTE, FileLine, Layout, find_layout
 from omnidyn.logs.table.rows import Column, RowParser
 from omnidyn.logs.table.table import MAX_CELLS, ROWS, FileTable
-from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY, TextBlock, TextFile
+from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY, TextBlock, TextFile, cut_short
 
 HEAD_ROWS = 100  # the first rows are looked at together to tell how a file is written
 KEPT_COMMENTS = 2  # right above a row: names, and perhaps their units
@@ -78,7 +78,9 @@ def _as_they_stand(path: str | os.PathLike, rows: int, options: ReadOptions) -> 
         texts, lines = _kept(block, layout.first)
         if texts and file.ends_open and lines[-1] == file.last and _is_cut(texts[-1], layout):
             texts, lines = texts[:-1], lines[:-1]
-            file.notes.append(f"line {file.last}, the last one, ends in the middle of a row: it was left out")
+            file.notes.append(
+                cut_short(f"line {file.last}, the last one, ends in the middle of a row: it was left out")
+            )
         if texts:
             later = partial(_texts_from, file, layout, block.first + len(block.lines), spaced)
             yield table(*parser.parse(texts, lines, later))

@@ -28,7 +28,7 @@ from omnidyn.logs.readers.recording import Recording, topic_of
 from omnidyn.logs.readers.ros.layout import column
 from omnidyn.logs.readers.wpilib_structs import BadSchemaError, leaves_of
 from omnidyn.logs.table.table import FileTable
-from omnidyn.logs.table.text_file import BLOCK_BYTES, TOO_LARGE_REMEDY
+from omnidyn.logs.table.text_file import BLOCK_BYTES, TOO_LARGE_REMEDY, cut_short
 from omnidyn.progress import Report
 
 MAGIC = b"WPILOG"
@@ -201,7 +201,7 @@ def read_wpilog(path: str | os.PathLike, options: ReadOptions) -> Recording:
         file.read()
         notes = [*growth(stream, size), *file.odd.notes]
     if file.damage:
-        notes.append(f"the file is damaged: {file.damage}; {file.count} values before that were read")
+        notes.append(cut_short(f"the file is damaged: {file.damage}; {file.count} values before that were read"))
     schemas = {
         name.removeprefix(SCHEMA_ENTRY): bytes(entry.values[: entry.sizes[0]]).decode("utf-8", "replace")
         for (name, kind), entry in file.entries.items()

@@ -58,7 +58,7 @@ class FileTable:
     units: Mapping[str, str]
     source: str
     sha256: str
-    notes: tuple[str, ...] = ()
+    notes: tuple[Statement | str, ...] = ()
     titles: Mapping[str, str] = field(default_factory=dict)
     says: Mapping[str, Declaration] = field(default_factory=dict)
     own_clocks: bool = False

@@ -14,6 +14,7 @@ from typing import NamedTuple
 from omnidyn.errors import InputError
 from omnidyn.files import empty, file_format, growth, open_regular, text_format, too_large
 from omnidyn.progress import Progress, Report, silent
+from omnidyn.statement import WARNING, Statement
 
 BLOCK_BYTES = 2**20
 SHOWN_BYTES = 8  # of a file that is no text
@@ -23,6 +24,12 @@ MOST_CONTROLS = 0.01  # of the bytes of a file that is damaged text
 MOST_ODD = 0.3  # of the bytes of a text in an encoding of its own; three in five of mere noise are odd
 _NO_CONTROLS = bytes([0, 9, 10, 12, 13, *range(32, 127), *range(128, 256)])  # zero is judged by itself
 TOO_LARGE_REMEDY = "cut it, allow more with `max_bytes`, or read it in pieces with iter_tables"
+FILE_CUT_SHORT = "file_cut_short"
+
+
+def cut_short(text: str) -> Statement:
+    """What a reader notes of a file that ends too early, in words."""
+    return Statement(FILE_CUT_SHORT, WARNING, numbers={"text": text})
 
 
 class TextBlock(NamedTuple):
@@ -41,7 +48,7 @@ class TextFile:
 
     def __init__(self, path: str | os.PathLike, progress: Progress = silent, max_bytes: int | None = None):
         self.path, self.source = path, str(path)
-        self.notes: list[str] = []
+        self.notes: list[Statement | str] = []
         self._progress, self._max_bytes, self._hash = progress, max_bytes, hashlib.sha256()
         self._latin_line = 0
         self._start = b""  # what the file begins with
@@ -155,7 +162,9 @@ class TextFile:
                 )
             if len(text) < len(block) and not zeros:
                 zeros = True
-                self.notes.append("zero bytes at the end, as a recorder leaves that lost its power, were left out")
+                self.notes.append(
+                    cut_short("zero bytes at the end, as a recorder leaves that lost its power, were left out")
+                )
             if text:
                 yield text
         if decoder is not None:

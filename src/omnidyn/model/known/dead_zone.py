@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from omnidyn.arguments import check_order
-from omnidyn.arrays import FloatArray
+from omnidyn.arguments import Rng, check_order, seed_of
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.document import Document, Part, Table, Words, all_of, plain
 from omnidyn.model.actuation import clip_voltage
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moving_axes
@@ -71,7 +71,8 @@ class DeadZone:
     """The dead zone of a robot. rows: one per pattern, by default along x, along y and about yaw.
 
     directions: of travel [rad], shape (k,). voltage: of the most loaded motor at which it starts to move that way [V],
-    shape (k,). band: its 95 % interval; None where the file has no std. full: the volts that a duty of 1 is.
+    shape (k,). patterns: of voltages that push along each direction without a torque, largest entry 1, shape
+    (k, wheels). band: 95 % interval of `voltage`; None where the file has no std. full: the volts that a duty of 1 is.
     full_of: "supply" or "voltage_limit". rests_on: numbers with a std, and guesses, that the rows change with; the
     strongest first. draws: robots behind the intervals.
     """
@@ -80,11 +81,19 @@ class DeadZone:
     rows: tuple[PatternBreakaway, ...]
     directions: FloatArray
     voltage: FloatArray
+    patterns: FloatArray
     band: Interval | None
     full: float
     full_of: str
     rests_on: tuple[RestsOn, ...]
     draws: int
+
+    def moving_axes(self, voltage: ArrayLike) -> BoolArray:
+        """Which axes of the robot at rest start to move under a held voltage [V], shape (*batch, wheels).
+
+        Shape (*batch, 3), for x, y, yaw. The voltage limit is not applied.
+        """
+        return moving_axes(self.robot, voltage)
 
     @property
     def guesses(self) -> tuple[str, ...]:
@@ -204,7 +213,14 @@ class DeadZone:
         )
 
 
-def dead_zone(robot: Robot, patterns: ArrayLike | None = None, *, draws: int = DRAWS, seed: int = 0) -> DeadZone:
+def dead_zone(
+    robot: Robot,
+    patterns: ArrayLike | None = None,
+    *,
+    directions: ArrayLike = AROUND,
+    draws: int = DRAWS,
+    rng: Rng = 0,
+) -> DeadZone:
     """The dead zone of a robot at rest: along each axis and over the direction of travel, each with its 95 % interval.
 
     The intervals follow from the std and the correlations of the robot file, guesses included; a file without any std
@@ -212,24 +228,35 @@ def dead_zone(robot: Robot, patterns: ArrayLike | None = None, *, draws: int = D
 
     Args:
         robot: The robot, at rest.
-        patterns: Of voltages, shape (k, wheels), no unit; by default those of `axis_patterns`.
-        draws: Number of plausible robots of the intervals (`plausible`).
-        seed: Of the draws.
+        patterns: Of voltages, shape (k, wheels), no unit; by default one for each axis, x, y and yaw: the pattern of
+            least norm that pushes along that axis only, with a largest entry of 1.
+        directions: Of travel [rad], shape (m,); by default every 5 degrees.
+        draws: Number of plausible robots of the intervals.
+        rng: A seed or a numpy.random.Generator of the draws.
 
     Raises InputError where a pattern has not one entry per wheel, or for a strange number of draws.
+
+    >>> import omnidyn
+    >>> zone = omnidyn.dead_zone(omnidyn.load_robot("axebot"))
+    >>> [(row.axis, round(row.scale, 3)) for row in zone.rows]
+    [('x', 0.67), ('y', 0.528), ('yaw', 0.174)]
+    >>> zone.moving_axes([0.0, 0.6, -0.6]).tolist()  # 0.6 V times the pattern of x: less than it takes
+    [False, False, False]
     """
     check_order("dead_zone(robot)", (robot, Robot), (patterns, object))
     asked_patterns = axis_patterns(robot) if patterns is None else np.atleast_2d(np.asarray(patterns, dtype=float))
     scale = breakaway_voltage(robot, asked_patterns)
-    voltage, around = dead_zone_map(robot, AROUND)
+    directions = np.atleast_1d(np.asarray(directions, dtype=float))
+    voltage, around = dead_zone_map(robot, directions)
     all_patterns = np.concatenate([asked_patterns, around])
     interval = None
     if told(robot).keys:
-        interval = interval_of(robot, partial(_volts_and_duty, patterns=all_patterns), draws, seed)
+        interval = interval_of(robot, partial(_volts_and_duty, patterns=all_patterns), draws, seed_of(rng))
     count, full, full_of = len(asked_patterns), *_full(robot)
     rows = [_row(robot, asked_patterns[k], float(scale[k]), full, interval, k, len(all_patterns)) for k in range(count)]
     band = None if interval is None else Interval(*(end[count : len(all_patterns)] for end in interval))
-    return DeadZone(robot, tuple(rows), AROUND, voltage, band, full, full_of, _rests_on(robot, asked_patterns), draws)
+    basis = _rests_on(robot, asked_patterns)
+    return DeadZone(robot, tuple(rows), directions, voltage, around, band, full, full_of, basis, draws)
 
 
 def _volts_and_duty(robot: Robot, patterns: FloatArray) -> FloatArray:

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,15 +71,20 @@ class Draws:
             raise InputError("strange number of draws", got=count, expected=f"1 to {MOST_DRAWS}", where="draws")
         self._off = _errors(self._uncertain, count, seed)
 
-    @property
+    @cached_property
     def values(self) -> FloatArray:
         """The numbers drawn, not yet brought back into any range. Shape (count, keys)."""
         columns = zip(self.keys, self._uncertain.value.tolist(), self._off.T, self._uncertain.log, strict=True)
         return np.stack([_off(key, value, off, bool(log)) for key, value, off, log in columns], axis=1)
 
+    @property
+    def log(self) -> tuple[bool, ...]:
+        """Which numbers have a logarithmic scale: their median is the value, their mean is above it."""
+        return tuple(map(bool, self._uncertain.log))
+
     def robot(self, k: int) -> Robot:
         """Robot k."""
-        return _drawn(self._origin, self.keys, self._uncertain, self._off[k])
+        return _drawn(self._origin, self.keys, self._uncertain, self._off[k], self.values[k])
 
 
 def _known(robot: Robot) -> tuple[list[Key], Told]:
@@ -192,18 +198,22 @@ def _aside(robot: Robot, keys: Sequence[Key], uncertain: Told, off: FloatArray) 
     return robots
 
 
-def _drawn(robot: Robot, keys: Sequence[Key], uncertain: Told, off: FloatArray) -> Robot:
-    """One robot. What no robot file may hold comes half-way back to the value, as often as that takes."""
+def _drawn(robot: Robot, keys: Sequence[Key], uncertain: Told, off: FloatArray, values: FloatArray) -> Robot:
+    """One robot. What no robot file may hold comes half-way back to the value, as often as that takes.
+
+    values: what these errors make of the numbers, taken as they are: an exponential of another array has other bits.
+    """
     for _ in range(PULLS):
         draw = robot
-        for k, key in enumerate(keys):
-            value = float(uncertain.value[k])
-            draw = key.set(draw, float(_off(key, value, float(off[k]), bool(uncertain.log[k]))), checked=False)
+        for key, number in zip(keys, values.tolist(), strict=True):
+            draw = key.set(draw, number, checked=False)
         draw = holding(draw)
         bad_parts = _out_of_range(draw, robot)
         if not bad_parts:
             return draw
         off = np.where([key.part in bad_parts for key in keys], 0.5 * off, off)
+        columns = zip(keys, uncertain.value.tolist(), off.tolist(), uncertain.log, strict=True)
+        values = np.array([_off(key, value, error, bool(log)) for key, value, error, log in columns])
     return robot
 
 

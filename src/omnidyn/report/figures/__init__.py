@@ -1,7 +1,8 @@
 """Pictures; each function returns a `Picture`.
 
-Of the paper: paper_pictures, robot. Of logs: raw_log, overlay, path. Of a fit: residuals, friction_speed, shapes,
-motor_lines, dead_zone_map. Of closed loops: tracking, moving (a GIF). Of campaigns: campaign. channels is shared.
+Of the paper: paper_pictures, robot. Of logs: raw_log, overlay, path. Of a drive to come: plan. Of a fit:
+residuals, friction_speed, shapes, motor_lines, dead_zone_map. Of closed
+loops: tracking, moving (a GIF). Of campaigns: campaign. channels is shared.
 dead_zone_section: the section on the dead zone.
 paper_dead_zone: Fig. 5.
 paper_friction: Fig. 3.

@@ -33,9 +33,9 @@ MOST_POINTS = 4000
 MOST_PANELS = 4
 
 
-def draw_tracking(trackings: Tracking | Iterable[Tracking]) -> Picture:
+def draw_tracking(trackings: Iterable[Tracking]) -> Picture:
     """Where they went, and how far off they were over time."""
-    tracking_list = [trackings] if isinstance(trackings, Tracking) else list(trackings)
+    tracking_list = list(trackings)
     with look():
         figure = new_figure(WIDTH, 4.6)
         plane = figure.add_axes((0.08, 0.12, 0.4, 0.72))

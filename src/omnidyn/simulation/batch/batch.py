@@ -21,12 +21,13 @@ from omnidyn.simulation.batch.result import BatchRun, BatchState, Statistics
 from omnidyn.simulation.batch.singles import SingleGroup
 from omnidyn.simulation.batch.threads import Threads
 from omnidyn.simulation.commands import MAX_DT, MIN_DT, as_floats
-from omnidyn.simulation.engine import as_tolerance
+from omnidyn.simulation.engine import LARGEST_START, as_start, as_tolerance
 from omnidyn.statement import WARNING, Statement
 
 if TYPE_CHECKING:
     from omnidyn.simulation.batch.sample import Sample  # slow to load, for it needs SciPy
 
+MOST_SUBSTEPS = 10_000
 POSES = (None, FAST_POSE, EXACT_POSE)
 
 
@@ -46,6 +47,7 @@ def simulate_batch(
     dtype: Any = float,
     threads: int | None = None,
     tol: float | None = None,
+    substeps: int = 1,
 ) -> BatchRun:
     """Simulate many robots under commands held from row to row, as `simulate` does one.
 
@@ -66,7 +68,9 @@ def simulate_batch(
         statistics: Keep mean, root mean square, least and largest over the ends of all rows.
         dtype: float, or numpy.float32 in half the time, for what moves in blocks.
         threads: How many work; None takes one for each processor.
-        tol: Of engines that are not exact [m/s]; None takes one fixed step a row.
+        tol: Of engines that are not exact [m/s], robot by robot; None takes `substeps` fixed steps a row.
+        substeps: Fixed steps in a row, of engines that are not exact. Steps of 1 ms are off by up to 2e-3 m/s,
+            7e-3 rad/s and, over 5 s, 2e-3 m; the error goes with the step: docs/how-to/batches.md has the table.
 
     Raises InputError for wrong shapes, values that are not finite in what all robots share, a dt outside 1e-9..3600 s.
     """
@@ -89,6 +93,7 @@ def simulate_batch(
         dtype=dtype,
         threads=threads,
         tol=tol,
+        substeps=substeps,
     )
     return batch.run(as_floats(names[0], given[names[0]]), every=every, statistics=statistics)
 
@@ -112,6 +117,7 @@ class Batch:
         dtype: Any = float,
         threads: int | None = None,
         tol: float | None = None,
+        substeps: int = 1,
     ) -> None:
         self.dt, self.command, self.pose, self._supply = _as_dt(dt), command, pose, supply
         _check_word("pose", pose, POSES)
@@ -119,7 +125,14 @@ class Batch:
         _check_word("dtype", _dtype_name(dtype), ("float64", "float32"))
         if supply is not None and not is_number(supply):
             raise InputError("no supply", got=supply, expected="one number of volts, or None", where="supply")
-        as_tolerance(tol)
+        if not is_whole(substeps) or not 1 <= substeps <= MOST_SUBSTEPS:
+            raise InputError(
+                "cannot cut a row into so many steps",
+                got=substeps,
+                expected=f"1 to {MOST_SUBSTEPS}",
+                where="substeps",
+            )
+        self._substeps = 1 if as_tolerance(tol) else int(substeps)
         self._threads = Threads(threads)
         self._groups = self._group(robots, np.dtype(dtype), tol)
         self.count = sum(group.count for _, group in self._groups)
@@ -136,7 +149,7 @@ class Batch:
                 _check_drive(center, self.command, self._supply)
                 self.wheels = center.wheels.count
                 turning, drivers = np.full(parameters.count, center.body.rotating_frame), [(center, slice(None))]
-                group = BlockGroup(kind, parameters, drivers, turning, self.dt, self.pose, dtype)
+                group = BlockGroup(kind, parameters, drivers, turning, self._length(kind), self.pose, dtype)
                 return [(np.arange(parameters.count), group)]
         fleet: Any = robots
         if isinstance(robots, Iterable) and not isinstance(robots, str | Robot):
@@ -152,18 +165,22 @@ class Batch:
             places.setdefault(kinds[id(robot)], []).append(k)
         groups = []
         for kind, index in places.items():
-            members = [fleet[k] for k in index]
+            members, length = [fleet[k] for k in index], self._length(kind)
             if kind == GENERAL:
-                group: Any = SingleGroup(members, self.command, self._supply, self.dt, self.pose, tol)
+                group: Any = SingleGroup(members, self.command, self._supply, length, self.pose, tol)
             elif self.command == WHEEL_SPEED:
-                group = LoopGroup(kind, members, self.dt, self.pose, dtype)
+                group = LoopGroup(kind, members, length, self.pose, dtype)
             else:
                 turning = np.array([robot.body.rotating_frame for robot in members])
                 parameters = batch_parameters(members)
                 drivers = drivers_of(members)
-                group = BlockGroup(kind, parameters, drivers, turning, self.dt, self.pose, dtype, members)
+                group = BlockGroup(kind, parameters, drivers, turning, length, self.pose, dtype, members)
             groups.append((np.array(index), group))
         return groups
+
+    def _length(self, kind: str) -> float:
+        """Of a step of an engine [s]; the exact one takes a row as a whole."""
+        return self.dt if kind == EXACT else self.dt / self._substeps
 
     @property
     def engines(self) -> dict[str, int]:
@@ -208,6 +225,11 @@ class Batch:
         array = as_floats(name, value)
         if array.shape not in ((3,), (self.count, 3)):
             raise InputError("wrong shape", got=array.shape, expected=f"(3,) or ({self.count}, 3)", where=name)
+        if array.ndim == 1:
+            as_start(name, array, 3)
+        else:  # a robot that starts nowhere is marked as failed
+            for row in array[np.abs(array).max(axis=1) > LARGEST_START[name]][:1]:
+                as_start(name, row, 3)
         return np.broadcast_to(array, (self.count, 3))
 
     def step(self, command: ArrayLike) -> BatchState:
@@ -248,10 +270,18 @@ class Batch:
         raise InputError("wrong shape", got=rows.shape, expected=expected, where=self.command)
 
     def _run(self, commands: BatchCommands, every: int, statistics: bool) -> list[GroupRun]:
-        return [
-            group.run(commands if len(self._groups) == 1 else commands.of(index), every, statistics, self._threads)
-            for index, group in self._groups
-        ]
+        runs = []
+        for index, group in self._groups:
+            own = commands if len(self._groups) == 1 else commands.of(index)
+            cuts = round(self.dt / group.dt)
+            if cuts > 1:
+                own = own._replace(rows=np.repeat(own.rows, cuts, axis=1))
+            run = group.run(own, cuts * every, statistics, self._threads)
+            if run.totals is not None:
+                sums = run.totals.shape[1] // 2  # of values and of their squares, before least and largest
+                run.totals[:, :sums] /= own.steps
+            runs.append(run._replace(clipped=(run.clipped[0] // cuts, run.clipped[1] // cuts)))
+        return runs
 
     def _merged(self, commands: BatchCommands, runs: list[GroupRun], every: int, statistics: bool) -> BatchRun:
         """One run of those of the groups."""
@@ -264,8 +294,8 @@ class Batch:
             t=np.arange(samples.shape[1]) * (every * self.dt) if samples is not None else None,
             twists=None if samples is None else samples[..., :3],
             poses=None if samples is None or not has_pose else samples[..., 3:],
-            twist_statistics=None if totals is None else _statistics(totals, 0, steps),
-            pose_statistics=None if totals is None or not has_pose else _statistics(totals, 3, steps),
+            twist_statistics=None if totals is None else _statistics(totals, 0),
+            pose_statistics=None if totals is None or not has_pose else _statistics(totals, 3),
             warnings=_warnings(runs, self.command, steps * len(commands.rows)),
         )
 
@@ -280,10 +310,10 @@ def _together(parts: list[Any], groups: list[tuple[IntArray, Any]], count: int) 
     return whole
 
 
-def _statistics(totals: FloatArray, first: int, steps: int) -> Statistics:
-    """Of the three rows from `first` on; totals (n, sums, sums of squares, least, largest)."""
-    total, squares, least, largest = (part[:, first : first + 3] for part in np.split(totals, 4, axis=1))
-    return Statistics(total / steps, np.sqrt(squares / steps), least, largest)
+def _statistics(totals: FloatArray, first: int) -> Statistics:
+    """Of the three rows from `first` on; totals (n, means, means of squares, least, largest)."""
+    mean, squares, least, largest = (part[:, first : first + 3] for part in np.split(totals, 4, axis=1))
+    return Statistics(mean, np.sqrt(squares), least, largest)
 
 
 def _warnings(runs: list[GroupRun], command: str, rows: int) -> tuple[Statement, ...]:

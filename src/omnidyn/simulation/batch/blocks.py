@@ -222,7 +222,7 @@ class BlockGroup:
         self.count = parameters.count
         self.engines = {EXACT_NAME if kind == EXACT else IMPLICIT_NAME: self.count}
         self._dtype, self._pose = np.dtype(dtype), pose
-        self._delays = Delays(drivers, self.count, dt)
+        self.dt, self._delays = dt, Delays(drivers, self.count, dt)
         self._march: Callable[..., None] = march_implicit
         rule: tuple[Any, ...] = (stages(kind in (BOX, LIMITED[BOX]), dt, self._dtype),)
         law = implicit_law(parameters, turning) if kind != EXACT else np.empty(0)

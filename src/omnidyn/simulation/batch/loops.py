@@ -139,7 +139,7 @@ class LoopGroup:
 
     def __init__(self, kind: str, robots: Sequence[Robot], dt: float, pose: str | None, dtype: Any) -> None:
         self.count, self.engines = len(robots), {IMPLICIT_NAME: len(robots)}
-        self._dt, self._dtype, self.rows = dt, np.dtype(dtype), 3 if pose is None else 6
+        self.dt, self._dtype, self.rows = dt, np.dtype(dtype), 3 if pose is None else 6
         parameters, turning = batch_parameters(robots), np.array([robot.body.rotating_frame for robot in robots])
         law = with_share(implicit_law(parameters, turning), np.full(self.count, dt), dt)
         self._laws, self._rule = in_blocks(law, self._dtype), stages(kind == BOX, dt, self._dtype)
@@ -215,7 +215,7 @@ class LoopGroup:
 
     def _cut(self, robot: Robot, done: int, steps: int) -> tuple[FloatArray, BoolArray, IntArray, IntArray]:
         """(shares, ticks, which of the commands acts, counted in `known`) of pieces, and where each row begins."""
-        dt = self._dt
+        dt = self.dt
         held = Commands(np.full(steps, dt), None, set_point=np.zeros((steps, 1)))
         lengths, _, tick, begins = on_ticks(robot, held, done * dt)
         start = np.concatenate([[0.0], np.cumsum(lengths)])[:-1]

@@ -22,7 +22,7 @@ class BatchState(NamedTuple):
 
 
 class Statistics(NamedTuple):
-    """Over the ends of all steps, robot by robot. Shape (n, 3) each."""
+    """Over the ends of all steps, robot by robot: of rows, or of their substeps. Shape (n, 3) each."""
 
     mean: FloatArray
     rms: FloatArray

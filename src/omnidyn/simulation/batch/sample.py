@@ -7,7 +7,8 @@ Numbers that only scale what moves a robot are drawn for a million robots at onc
 
     push of a volt ~ l K_t/(R r),   back-EMF ~ l^2 K_t K_v/(R r^2)
 
-Any other number, or one that differs from wheel to wheel, takes a robot of its own for each draw: 0.2 ms.
+in the order of operations of one robot, so that a sample moves as its robots do, to the last bit. Any other number, or
+one that differs from wheel to wheel, takes a robot of its own for each draw: 0.2 ms.
 """
 
 from __future__ import annotations
@@ -19,40 +20,43 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.arguments import is_whole
+from omnidyn.arguments import Rng, is_whole, seed_of
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
-from omnidyn.model.dynamics import motor_wrench
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, COULOMB, DIRECTION, EMF, TORQUE, VISCOUS, Key, expand
 from omnidyn.model.known.breakaway_levels import holding
 from omnidyn.model.known.uncertainty import MOST_DRAWS, Draws
 from omnidyn.model.mass import added_mass
 from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import per_wheel, rim_speed, wrench_from_traction
 from omnidyn.simulation.batch.parameters import BatchParameters, batch_parameters
 
 MASS, INERTIA, RADIUS = "body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m"
-POWERS = {  # of push and of back-EMF, by each number
-    "motor.resistance_ohm": (-1, -1),
-    TORQUE: (1, 1),
-    EMF: (0, 1),
-    "motor.gear_ratio": (1, 2),
-    RADIUS: (-1, -2),
-}
-SPINS = ("motor.gear_ratio", RADIUS)  # they also change the mass of what spins
+RESISTANCE, GEAR = "motor.resistance_ohm", "motor.gear_ratio"
+MOTOR = (RESISTANCE, TORQUE, EMF, GEAR, RADIUS)  # they scale what motors do, alike at all wheels
+SPINS = (GEAR, RADIUS)  # they also change the mass of what spins
+LOG_NORMAL, NORMAL, EVEN = "log-normal", "normal", "even"  # how a number is drawn
+SCALES = {LOG_NORMAL: "log-normal, the value is the median", NORMAL: "normal", EVEN: "even"}
 LEVELS = (VISCOUS, COULOMB, BREAKAWAY)
 
 
 class Sample(Sequence[Robot]):
     """Robots drawn around one. center: that robot; keys, values (n, keys): what was drawn, in the unit of each key.
 
-    parameters: of all of them, for blocks; None where each takes a robot of its own. A sequence of robots, each made as
-    it is asked for.
+    scales: how each number was drawn, "log-normal", "normal" or "even". parameters: of all of them, for blocks; None
+    where each takes a robot of its own. A sequence of robots, each made as it is asked for.
     """
 
     def __init__(
-        self, center: Robot, keys: Sequence[str], values: FloatArray, robot_of: Callable[[int], Robot]
+        self,
+        center: Robot,
+        keys: Sequence[str],
+        values: FloatArray,
+        robot_of: Callable[[int], Robot],
+        scales: Sequence[str] = (),
     ) -> None:
         self.center, self.keys, self.values, self._robot_of = center, tuple(keys), values, robot_of
+        self.scales = tuple(scales) or (EVEN,) * len(self.keys)
         self.parameters = scaled_parameters(center, dict(zip(keys, values.T, strict=True)))
 
     def __len__(self) -> int:
@@ -70,26 +74,33 @@ class Sample(Sequence[Robot]):
         return self[k]
 
     def __repr__(self) -> str:
-        return f"<Sample of {len(self)} robots around {self.center.name}: {', '.join(self.keys)}>"
+        pairs = [*zip(self.keys, self.scales, strict=True)]
+        words = [
+            f"{SCALES[scale]}: {', '.join(key for key, own in pairs if own == scale)}"
+            for scale in dict.fromkeys(self.scales)
+        ]
+        return f"<Sample of {len(self)} robots around {self.center.name}; {'; '.join(words)}>"
 
 
 def sample(
     fit: Any,
     count: int,
-    seed: int = 0,
+    rng: Rng = 0,
     *,
     ranges: Mapping[str, tuple[float, float]] | None = None,
     factors: Mapping[str, tuple[float, float]] | None = None,
 ) -> Sample:
     """Robots that may be meant: by all std and correlations of a fit or of a robot, or by ranges of numbers.
 
+    A std is one of the logarithm, std/value, where a number must be above 0 or a friction is twice its std or more: the
+    value stays the median, and the mean of a number with a large std lies above it. Any other number is normal.
     What is drawn beyond a limit of the robot file comes back half-way as often as it takes; friction stays above 0, and
     breakaway is at least its Coulomb level. One seed gives the same robots, always.
 
     Args:
         fit: An estimate, or a robot.
         count: Number of robots.
-        seed: Of the draws.
+        rng: A seed or a numpy.random.Generator of the draws.
         ranges: Key of a robot file -> (low, high), in its unit; that of a list stands for each entry.
         factors: The same in shares of the value, such as (0.8, 1.2).
 
@@ -105,12 +116,11 @@ def sample(
         raise InputError("cannot draw robots from this", got=type(fit).__name__, expected="an estimate, or a robot")
     if not is_whole(count) or not 1 <= count <= MOST_DRAWS:
         raise InputError("strange number of draws", got=count, expected=f"1 to {MOST_DRAWS}", where="count")
-    if not is_whole(seed) or seed < 0:
-        raise InputError("no seed", got=seed, expected="a whole number, 0 or more", where="seed")
+    seed = seed_of(rng)
     if ranges is None and factors is None:
         draws = Draws(center, count, seed)
         keys, values = [str(key) for key in draws.keys], draws.values
-        found = Sample(center, keys, values, draws.robot)
+        found = Sample(center, keys, values, draws.robot, [LOG_NORMAL if log else NORMAL for log in draws.log])
         ends = [values.min(axis=0), values.max(axis=0)]
         if found.parameters is not None and not all(_is_allowed(center, keys, end) for end in ends):
             found.parameters = batch_parameters(list(found))
@@ -183,10 +193,6 @@ def scaled_parameters(center: Robot, drawn: Mapping[str, FloatArray]) -> BatchPa
     if not all(_scales(name) and not (spins and name in SPINS) for name in drawn) or any(center.body.centre):
         return None
     count = len(next(iter(drawn.values())))
-    share = {name: drawn[name] / float(Key.parse(name).get(center)) for name in POWERS if name in drawn}
-    push, back_emf = np.ones(count), np.ones(count)
-    for name, factor in share.items():
-        push, back_emf = push * factor ** POWERS[name][0], back_emf * factor ** POWERS[name][1]
 
     def level(table: str, field: str) -> FloatArray:
         """A level of friction along the three axes, shape (3, n)."""
@@ -197,20 +203,40 @@ def scaled_parameters(center: Robot, drawn: Mapping[str, FloatArray]) -> BatchPa
                 names[:2] = [f"{table}.{field}"] * 2
         return np.array([drawn.get(name, np.full(count, float(Key.parse(name).get(center)))) for name in names])
 
-    motors, base = motor_wrench(center), batch_parameters([center])
+    driving, braking = _motors(center, drawn, count)
     damping = level(BODY_AXES, VISCOUS) + level(DIRECTION, VISCOUS)
     slides, along = level(BODY_AXES, COULOMB), level(DIRECTION, COULOMB)
     holds = slides if center.friction.axes.breakaway is None else np.maximum(slides, level(BODY_AXES, BREAKAWAY))
     mass, inertia = (drawn.get(name, np.full(count, value)) for name, value in _body(center))
     spin = np.diag(added_mass(center))[:, None]
     return BatchParameters(
-        base.push * push,
-        damping - np.diag(motors.braking)[:, None] * back_emf,
+        driving,
+        damping - braking,
         slides + along,
         holds + along,
         np.stack([mass, mass, inertia]) + spin,
         mass,
     )
+
+
+def _motors(center: Robot, drawn: Mapping[str, FloatArray], count: int) -> tuple[FloatArray, FloatArray]:
+    """What motors do per volt, shape (3, wheels, n), and per speed of each axis, shape (3, n): `motor_wrench` of each.
+
+    The same operations in the same order as `settled_current`, `traction` and `wrench_from_traction`.
+    """
+    wheels = center.wheels
+    names = {RESISTANCE: "resistance", TORQUE: "torque_constant", EMF: "emf_constant", GEAR: "gear_ratio"}
+    base = {key: per_wheel(getattr(center.motor, name), wheels.count) for key, name in names.items()}
+    base[RADIUS] = wheels.radii
+    resistance, torque, emf, gear, radius = (drawn[key][:, None, None] if key in drawn else base[key] for key in MOTOR)
+    speed = rim_speed(wheels, np.eye(3)) / radius
+    volts = np.eye(wheels.count)[None], 0.0 - emf * gear * speed
+    per_volt, per_speed = (
+        wrench_from_traction(wheels, gear * torque * (driving / resistance) / radius) for driving in volts
+    )
+    per_volt = np.broadcast_to(per_volt, (count, wheels.count, 3))
+    braking = np.broadcast_to(per_speed, (count, 3, 3)).diagonal(axis1=1, axis2=2)
+    return np.ascontiguousarray(per_volt.transpose(2, 1, 0) + 0.0), np.ascontiguousarray(braking.T)
 
 
 def _body(center: Robot) -> list[tuple[str, float]]:
@@ -219,7 +245,7 @@ def _body(center: Robot) -> list[tuple[str, float]]:
 
 def _scales(name: str) -> bool:
     """Whether a number enters by a scale or as a level."""
-    if name in POWERS or name in (MASS, INERTIA):
+    if name in MOTOR or name in (MASS, INERTIA):
         return True
     key = Key.parse(name)
     return (

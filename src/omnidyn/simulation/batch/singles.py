@@ -34,13 +34,13 @@ class SingleGroup:
     ) -> None:
         self.count, self.rows = len(robots), 3 if pose is None else 6
         self._robots = [_driven(robot, command) for robot in robots]
-        self._dt, self._supply, self._tol = dt, supply, tol
+        self.dt, self._supply, self._tol = dt, supply, tol
         self._live: list[LiveRobot | None] = [None] * len(robots)
         names = [self._start(k, np.zeros(3), np.zeros(3)).engine for k in range(self.count)]
         self.engines = dict(Counter(names))
 
     def _start(self, robot: int, twist: FloatArray, pose: FloatArray) -> LiveRobot:
-        return LiveRobot(self._robots[robot], self._dt, twist=twist, pose=pose, supply=self._supply, tol=self._tol)
+        return LiveRobot(self._robots[robot], self.dt, twist=twist, pose=pose, supply=self._supply, tol=self._tol)
 
     def reset(self, robots: IntArray, twist: FloatArray, pose: FloatArray) -> None:
         """Put some robots to a twist and a pose, shape (robots, 3) each."""

@@ -29,9 +29,14 @@ from omnidyn.simulation.environments.layout import (
     COULOMB,
     EXACT_LAW,
     FRAME_MASS,
+    KI,
+    KP,
+    LIMIT,
+    LOOP,
     PER_MASS,
     PHI,
     RATE,
+    RIM,
     W,
 )
 from omnidyn.simulation.exact.step import exact_step
@@ -79,6 +84,28 @@ def shrink(volts, band):
         for n in range(W):
             left = max(abs(volts[n]) - band, zero)
             volts[n] = left if volts[n] > zero else -left
+
+
+@inlined
+def close_loops(volts, loop, set_point, twist, robots, first, largest, zero):
+    """A tick of the speed loops of a block: volts (wheels, W), of `set_point` as shares of `largest`; loop: integrals.
+
+    As in simulation/speed_loop.py. first: the first row of the loops among those of `robots`.
+    """
+    v_x, v_y, omega = twist[0], twist[1], twist[2]
+    for wheel in range(len(volts)):
+        row, out, total, point, most = first + LOOP * wheel, volts[wheel], loop[wheel], set_point[wheel], largest[wheel]
+        kp, ki, limit = robots[row + KP], robots[row + KI], robots[row + LIMIT]
+        g0, g1, g2 = robots[row + RIM], robots[row + RIM + 1], robots[row + RIM + 2]
+        for n in range(W):
+            error = most * point[n] - (g0[n] * v_x[n] + g1[n] * v_y[n] + g2[n] * omega[n])
+            moved = total[n] + ki[n] * error
+            wanted = kp[n] * error + moved
+            takes = (abs(wanted) <= limit[n]) | (wanted * error < zero)
+            moved = moved if takes else total[n]
+            wanted = kp[n] * error + moved
+            total[n] = moved
+            out[n] = limit[n] if wanted > limit[n] else (-limit[n] if wanted < -limit[n] else wanted)
 
 
 @inlined
@@ -131,14 +158,14 @@ def advance(numbers, work, twist, drive, robots, piece):
 
 
 @inlined
-def travel(numbers, work, twist, mean, room, drive, robots, piece):
-    """Go on by the substeps of a piece; with mean and pose, each in halves, or from the stages of one step.
+def travel(numbers, work, twist, mean, room, drive, robots, piece, substeps):
+    """Go on by some substeps of a piece; with mean and pose, each in halves, or from the stages of one step.
 
     room (6, W): twists before and between. Poses stand in `work`, see `face`.
     """
-    share = numbers.shares[piece] / numbers.substeps
+    share = numbers.shares[piece] / numbers.substeps[piece]
     halves = numbers.halves[piece]
-    for half in range(halves * numbers.substeps):
+    for half in range(halves * substeps):
         if halves == 2:
             copy_rows(room[3 * (half % 2) : 3 * (half % 2) + 3], twist)
         advance(numbers, work, twist, drive, robots, piece)

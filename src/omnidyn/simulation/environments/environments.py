@@ -19,9 +19,12 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
+from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.batch.implicit import stages
 from omnidyn.simulation.batch.parameters import BatchParameters
+from omnidyn.simulation.commands import as_floats
+from omnidyn.simulation.engine import LARGEST_START
 from omnidyn.simulation.environments.layout import (
     BOX_LAW,
     DISABLED,
@@ -45,8 +48,10 @@ from omnidyn.simulation.environments.pool import (
     Range,
     check_robots,
     drawn_pool,
+    largest_speed,
     largest_voltage,
     law_of,
+    loop_rows,
     rows_of,
 )
 from omnidyn.simulation.environments.step import follow_up, reset_blocks, step_blocks
@@ -56,6 +61,7 @@ AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLE
 # Half the width of goals: twists [m/s, m/s, rad/s], poses [m, m, rad]; of where the path task begins beside its path
 SPREAD = {"velocity": (0.6, 0.6, 2.0), "pose": (1.0, 1.0, math.pi), "path": (0.05, 0.05, 0.1)}
 DURATION = {"velocity": 4.0, "pose": 6.0, "path": 6.0}  # [s] of an episode
+PLACE_TERMS = ("reward_position", "reward_heading")
 MOST_ROBOTS, MOST_LAG, EDGE = 2**24, 1000, 1e-9
 
 
@@ -123,6 +129,9 @@ def _checked(parameters: BatchParameters, robot: Robot, setting: Setting) -> Bat
     if setting.randomise or setting.uncertainty:
         got = "`parameters` beside `randomise` or `uncertainty`"
         raise InputError("drawn twice", got=got, expected="one of them", where="parameters")
+    if robot.drive.kind == SPEED:
+        got, expected = "parameters of a drive with a speed loop", "the robots themselves"
+        raise InputError("they leave out the loop", got=got, expected=expected, where="parameters")
     return parameters
 
 
@@ -140,6 +149,7 @@ class Environments:
         dtype: Of all numbers, float32 or float64.
         threads: That share a step.
         seed: Of the pool that ranges draw from.
+        poses: Whether poses are kept in the task "velocity" too, which asks for none.
 
     was_reset: whether any reset has been.
     """
@@ -156,6 +166,7 @@ class Environments:
         dtype: Any = np.float32,
         threads: int = 1,
         seed: int = 0,
+        poses: bool = False,
     ) -> None:
         setting = setting or Setting()
         given = [robots] if isinstance(robots, Robot) else list(robots)
@@ -176,7 +187,7 @@ class Environments:
         else:
             self.pool = drawn_pool(given, setting.randomise, setting.uncertainty, seed)
             check_robots(self.pool.robots)
-        self.wheels = given[0].wheels.count
+        self.wheels, self._poses = given[0].wheels.count, poses
         self.columns = columns_of(TASKS[setting.task], self.wheels)
         self.numbers = self._numbers(given[0], path)
         self.state = new_state(self.numbers, count, self.wheels)
@@ -184,28 +195,40 @@ class Environments:
         blocks = len(self.state.twist)
         share = -(-blocks // threads)
         self._parts = [(first, min(blocks, first + share)) for first in range(0, blocks, share)]
-        self._threads = ThreadPoolExecutor(len(self._parts) - 1) if len(self._parts) > 1 else None
+        self._threads = self._new_threads()
         self._now, self.was_reset = 0, False
+
+    def _new_threads(self) -> ThreadPoolExecutor | None:
+        return ThreadPoolExecutor(len(self._parts) - 1) if len(self._parts) > 1 else None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_threads": None}  # threads are of a process
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._threads = self._new_threads()
 
     def _numbers(self, robot: Robot, path: FloatArray | None) -> FixedNumbers:
         """What a step needs to know."""
         setting, kind = self.setting, self.dtype.type
         sensors = robot.sensor_model.in_steps(setting.dt)
         task = TASKS[setting.task]
-        late = (setting.latency + robot.drive.latency) / setting.dt
-        whole = math.floor(late + EDGE)
-        part = late - whole if late - whole > EDGE else 0.0
-        lags, shares = ([whole + 1, whole], [part, 1.0 - part]) if part else ([whole], [1.0])
-        substep = np.array(shares) * setting.dt / setting.substeps
-        travels = task != VELOCITY or sensors.averaged
-        voltage = largest_voltage(robot)
+        lags, shares, ticks = self._pieces(robot)
+        looped = robot.drive.kind == SPEED
+        substeps = np.array([count * -(-setting.substeps // sum(ticks)) for count in ticks])
+        if not looped:
+            substeps = np.full(len(shares), setting.substeps)
+        travels = task != VELOCITY or sensors.averaged or self._poses
+        voltage = np.ones(robot.wheels.count) if looped else largest_voltage(robot)
         law = law_of(robot) or EXACT_LAW
         halves = np.full(len(shares), 2 if travels else 1)
-        if len(shares) > 1 and law != EXACT_LAW:
+        if len(shares) > 1 and law != EXACT_LAW and not looped:
             halves[np.argmin(shares)] = 1
-        lengths = substep / halves
+        lengths = np.array(shares) * setting.dt / substeps / halves
+        members = self.pool.robots or (robot,)
         turning = [member.body.rotating_frame for member in self.pool.robots] or robot.body.rotating_frame
-        rows = rows_of(self.pool.parameters, law, turning, voltage, lengths, kind)
+        loops = loop_rows(members) if looped else None
+        rows = rows_of(self.pool.parameters, law, turning, voltage, lengths, kind, loops)
         rule = np.array([stages(law == BOX_LAW, length, kind).numbers for length in lengths])
         interval = 0 if setting.interval is None else max(1, round(setting.interval / setting.dt))
         if interval == 0 and self.pool.sizes[2] > 1:
@@ -214,7 +237,9 @@ class Environments:
         return FixedNumbers(
             task,
             AUTORESET[self.autoreset],
-            setting.substeps,
+            substeps,
+            np.array(ticks if looped else [0] * len(ticks), dtype=np.int64),
+            largest_speed(robot).astype(kind),
             setting.steps,
             halves,
             np.array(lags, dtype=np.int64),
@@ -237,6 +262,29 @@ class Environments:
             setting.dt,
         )
 
+    def _pieces(self, robot: Robot) -> tuple[list[int], list[float], list[int]]:
+        """(steps by which each piece of a step is late; its share of the step; ticks of a speed loop in it)."""
+        dt, latency = self.setting.dt, self.setting.latency + robot.drive.latency
+        count = 1
+        if robot.drive.kind == SPEED:
+            per_step = dt * float(robot.drive.rate or 0.0)
+            count = round(per_step)
+            if count < 1 or abs(per_step - count) > EDGE * per_step:
+                raise InputError(
+                    "a step is no whole number of ticks of the speed loop",
+                    got=f"{dt:g} s, {robot.drive.rate:g} Hz",
+                    expected="dt times rate_Hz a whole number",
+                    where="dt",
+                )
+            latency = math.ceil(latency / dt * count - EDGE) * dt / count  # it acts from the next tick on
+        late = latency / dt
+        whole = math.floor(late + EDGE)
+        part = late - whole if late - whole > EDGE else 0.0
+        if not part:
+            return [whole], [1.0], [count]
+        first = round(part * count)
+        return [whole + 1, whole], [part, 1.0 - part], [first, count - first]
+
     def _path(self, task: int, path: FloatArray | None) -> FloatArray:
         """The path as the kernels take it; one row where there is none."""
         if task != PATH:
@@ -256,13 +304,32 @@ class Environments:
         whole = W * len(self.state.twist)
         observation, reward = np.zeros((self.columns, whole), self.dtype), np.zeros(whole, self.dtype)
         terminated, truncated = np.zeros((2, whole), np.uint8)
-        return Buffers(observation, reward, terminated, truncated, np.zeros_like(observation))
+        travel, turn, success = np.zeros(whole, self.dtype), np.zeros(whole, self.dtype), np.zeros(whole, np.uint8)
+        return Buffers(observation, reward, terminated, truncated, np.zeros_like(observation), travel, turn, success)
 
-    def reset(self, mask: Any = None, seed: int | None = None) -> FloatArray:
+    def reset(
+        self,
+        mask: Any = None,
+        seed: int | None = None,
+        *,
+        goal: ArrayLike | None = None,
+        start: ArrayLike | None = None,
+        twist: ArrayLike | None = None,
+    ) -> FloatArray:
         """Begin an episode of all environments, or of those in a mask, (count,). Returns observations, a view.
 
-        seed: of their random numbers from here on; without one, each goes on with its own.
+        Args:
+            mask: Which begin, (count,).
+            seed: Of their random numbers from here on; without one, each goes on with its own.
+            goal: In place of a drawn one: twist or pose by the task; shape (3,) or (count, 3).
+            start: Pose to begin at [m, m, rad], of the tasks "pose" and "path"; shape as of `goal`.
+            twist: To begin with [m/s, m/s, rad/s]; shape as of `goal`.
         """
+        task, given = self.setting.task, {"goal": goal, "start": start, "twist": twist}
+        for name, without in (("goal", "path"), ("start", "velocity")):
+            if given[name] is not None and task == without:
+                raise InputError(f"the task {task} has no {name}", got=name, expected="none", where=name)
+        chosen_rows = {name: self._rows(name, value) for name, value in given.items() if value is not None}
         if seed is None and not self.was_reset:
             seed = int(np.random.SeedSequence().entropy)  # pyright: ignore[reportArgumentType]
         base = -1 if seed is None else int(np.random.SeedSequence(seed).generate_state(1)[0])
@@ -274,10 +341,44 @@ class Environments:
             raise InputError("not begun yet", got="a mask", expected="a reset of all first", where="mask")
         self.was_reset = True
         reset_blocks(self.numbers, self.state, chosen, base, self.buffers.observation)
+        if chosen_rows:
+            self._place(np.flatnonzero(chosen), chosen_rows)
         return self.buffers.observation[:, : self.count].T
 
+    def _rows(self, name: str, value: ArrayLike) -> FloatArray:
+        """A number of three for each environment. Shape (count, 3)."""
+        array = as_floats(name, value)
+        if array.shape not in ((3,), (self.count, 3)):
+            raise InputError("wrong shape", got=array.shape, expected=f"(3,) or ({self.count}, 3)", where=name)
+        rows = np.broadcast_to(array, (self.count, 3))
+        for row in rows[~(np.abs(rows).max(axis=1) <= LARGEST_START["twist"])][:1]:  # NaN is among them
+            raise InputError("no robot gets there", got=row.tolist(), expected="numbers within 1000", where=name)
+        return rows
+
+    def _place(self, index: Any, rows: Mapping[str, FloatArray]) -> None:
+        """Put robots, which have just begun, to a goal, a pose and a twist, and observe all again."""
+        block, lane = np.divmod(index, W)
+        state = self.state
+        for name, value in rows.items():
+            place = {"goal": state.goal, "start": state.pose, "twist": state.twist}[name]
+            place[block, :, lane] = value[index]
+            if name == "start":
+                state.places[block, 0, :, lane] = value[index]
+            if name == "twist":
+                state.mean[block, :, lane] = value[index]
+        reset_blocks(self.numbers, state, np.zeros(self.count, np.bool_), -1, self.buffers.observation)
+
+    def end(self, mask: ArrayLike) -> None:
+        """End the episodes of a mask, (count,), after a step: they begin anew with the next one, or by a reset."""
+        chosen = np.asarray(mask, bool)
+        if self.autoreset == "same_step" and chosen.any():
+            got, expected = "an end after the step", "next_step or disabled"
+            raise InputError("the next episode would have begun already", got=got, expected=expected, where="autoreset")
+        self.state.ended.reshape(-1)[: self.count] |= chosen
+        self.buffers.terminated[: self.count] |= chosen
+
     def step(self, action: ArrayLike) -> Step:
-        """Hold actions for dt: shares of the largest voltage, -1 to 1. Shape (count, wheels).
+        """Hold actions for dt: shares of the largest voltage or wheel speed, -1 to 1. Shape (count, wheels).
 
         The fastest are of `dtype` and lie by columns, as `observation` does: those are taken as they are.
         """
@@ -313,6 +414,14 @@ class Environments:
         return self.state.ended.reshape(-1)[: self.count].view(np.bool_)
 
     @property
+    def terms(self) -> dict[str, FloatArray]:
+        """The two terms of the last reward, and whether a robot is where it should be: views, (count,) each."""
+        names = ("reward_velocity", "reward_yaw_rate") if self.setting.task == "velocity" else PLACE_TERMS
+        out = self.buffers
+        terms = dict(zip(names, (out.travel[: self.count], out.turn[: self.count]), strict=True))
+        return {**terms, "success": out.success[: self.count].view(np.bool_)}
+
+    @property
     def final(self) -> FloatArray:
         """The last observation of episodes that ended in this step, where the next has begun. (count, columns)."""
         return self.buffers.final[:, : self.count].T
@@ -328,8 +437,13 @@ class Environments:
 
     @property
     def pose(self) -> FloatArray:
-        """The true poses; zeros in the task "velocity", which asks for none. Shape (count, 3)."""
+        """The true poses; zeros in the task "velocity" without `poses`. Shape (count, 3)."""
         return self._by_robot(self.state.pose)
+
+    @property
+    def goal(self) -> FloatArray:
+        """The goals: twists or poses; of a path how far beside it robots began. Shape (count, 3)."""
+        return self._by_robot(self.state.goal)
 
     @property
     def steps_done(self) -> Any:

@@ -15,10 +15,14 @@ W = 64  # robots in a block
 VELOCITY, POSE, PATH = 0, 1, 2  # tasks
 NEXT_STEP, SAME_STEP, DISABLED = 0, 1, 2  # when an episode that ended begins anew
 
-# Rows of the numbers of a robot, three each: one per axis; then phi of each piece of a step, then gain, 3 per wheel
+# Rows of the numbers of a robot, three each: one per axis; then phi of each piece of a step, then those of a speed loop,
+# LOOP per wheel, where there is one, then gain, 3 per wheel
 COULOMB, BREAKAWAY, RATE, PER_MASS, PHI = 0, 3, 6, 9, 12
 # Those of a robot of the implicit engine: forces, and ones in place of 1/M; where phi would begin, the mass that turns
 DAMPING, MASS, FRAME_MASS = 3, 6, 12
+
+KP, KI, LIMIT, RIM = 0, 1, 2, 3  # of a wheel in a speed loop; KI: of a tick; RIM: 3, speed of the wheel per twist
+LOOP = 6
 
 EXACT_LAW, BOX_LAW, DIRECTION_LAW = 0, 1, 2  # how a robot is moved
 
@@ -32,7 +36,8 @@ LATER, PER_INTERVAL, AGAIN = 16, 4, 3  # from LATER on for every interval a push
 class FixedNumbers(NamedTuple):
     """What does not change from step to step.
 
-    task, autoreset: as above. substeps: of a piece; halves: 2 of each with poses, or 1, a number per piece. limit:
+    task, autoreset: as above. substeps, ticks: of a piece, a number per piece; ticks: of a speed loop, 0 without one.
+    largest: set point of an action of 1 [rad/s], (wheels,). halves: 2 of each substep with poses, or 1, per piece. limit:
     steps of an episode. lags, shares: a row per piece of a step, by how many steps the voltage that acts in it is late,
     and its length as a share. averaged: whether measured speeds are means over the step, kept: share of the last one
     that a low pass keeps. travels: whether means and poses are needed; pushed: whether there are pushes.
@@ -45,7 +50,9 @@ class FixedNumbers(NamedTuple):
 
     task: int
     autoreset: int
-    substeps: int
+    substeps: Any
+    ticks: Any
+    largest: Any
     limit: int
     halves: Any
     lags: Any
@@ -71,8 +78,8 @@ class FixedNumbers(NamedTuple):
 class EnvironmentState(NamedTuple):
     """What changes. robots: their numbers, (blocks, rows, W). twist, pose, goal, push, mean: (blocks, 3, W).
 
-    past: actions of steps before, (blocks, lags, wheels, W); places: poses of these, (blocks, steps, 3, W). count,
-    episode, member, start (of the path): (blocks, W). key: of the random numbers; ended: whether the episode is over,
+    loops: integrals of a speed loop [V], (blocks, wheels, W). past: actions of steps before, (blocks, lags, wheels, W);
+    places: poses of these, (blocks, steps, 3, W). count, episode, member, start (of the path): (blocks, W). key: of the random numbers; ended: whether the episode is over,
     (blocks, W); rare: whether a block has an episode that ends or begins, (blocks,).
     """
 
@@ -82,6 +89,7 @@ class EnvironmentState(NamedTuple):
     goal: Any
     push: Any
     mean: Any
+    loops: Any
     past: Any
     places: Any
     count: Any
@@ -94,13 +102,19 @@ class EnvironmentState(NamedTuple):
 
 
 class Buffers(NamedTuple):
-    """What a step gives, of whole blocks. observation, final: (columns, W blocks). The others: (W blocks,)."""
+    """What a step gives, of whole blocks. observation, final: (columns, W blocks). The others: (W blocks,).
+
+    travel, turn: the two terms of the reward. success: whether the robot is where it should be.
+    """
 
     observation: Any
     reward: Any
     terminated: Any
     truncated: Any
     final: Any
+    travel: Any
+    turn: Any
+    success: Any
 
 
 def columns_of(task: int, wheels: int) -> int:
@@ -112,10 +126,11 @@ def new_state(numbers: FixedNumbers, robots: int, wheels: int) -> EnvironmentSta
     """A state for so many robots, whose blocks are whole; nobody has begun yet."""
     blocks, dtype = -(-robots // W), numbers.pool.dtype
     three = [np.zeros((blocks, 3, W), dtype) for _ in range(5)]
+    loops = np.zeros((blocks, wheels, W), dtype)
     past = np.zeros((blocks, max(1, int(numbers.lags.max())), wheels, W), dtype)
     places = np.zeros((blocks, max(1, numbers.late + numbers.hold), 3, W), dtype)
     counts = [np.zeros((blocks, W), np.int32) for _ in range(4)]
     marks = np.zeros((blocks, W), np.uint32), np.zeros((blocks, W), np.uint8), np.zeros(blocks, np.uint8)
     return EnvironmentState._make(
-        [np.zeros((blocks, numbers.pool.shape[1], W), dtype), *three, past, places, *counts, *marks]
+        [np.zeros((blocks, numbers.pool.shape[1], W), dtype), *three, loops, past, places, *counts, *marks]
     )

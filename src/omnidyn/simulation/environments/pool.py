@@ -16,14 +16,15 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.model.drive import DUTY, SPEED
+from omnidyn.model.drive import DUTY
 from omnidyn.model.keys import Key, expand
 from omnidyn.model.known.uncertainty import plausible
-from omnidyn.model.motor import DYNAMIC
+from omnidyn.model.motor import DYNAMIC, no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.batch.engine_kind import BOX, DIRECTION, EXACT, VOLTAGE, engine_kind
 from omnidyn.simulation.batch.parameters import BatchParameters, batch_parameters
+from omnidyn.simulation.commands import loop_gains
 from omnidyn.simulation.environments.layout import BOX_LAW, DIRECTION_LAW, EXACT_LAW
 from omnidyn.simulation.exact.exact_march import why_not_exact
 
@@ -141,8 +142,6 @@ def why_no_environment(robot: Robot) -> list[str]:
     reasons = why_not_exact(robot) if law_of(robot) is None else []
     if robot.motor.electrical == DYNAMIC:
         reasons.append('winding inductance ([motor] electrical = "dynamic")')
-    if robot.drive.kind == SPEED:
-        reasons.append('a speed loop in its firmware ([drive] kind = "speed")')
     if robot.drive.coasts:
         reasons.append('motors that coast ([drive] off = "coast")')
     if robot.drive.voltage_map:
@@ -158,7 +157,7 @@ def check_robots(robots: Sequence[Robot]) -> None:
             raise UnsupportedError(
                 "environments cannot move this robot",
                 got=f"{robot.name}: {', '.join(reasons)}",
-                expected="friction on the body axes or along the direction of travel, volts or duties",
+                expected="friction on the body axes or along the direction of travel, volts, duties or wheel speeds",
                 remedy="switch it off in a copy of the robot, by robot.replace(..)",
                 where="robot",
             )
@@ -176,8 +175,29 @@ def largest_voltage(robot: Robot) -> FloatArray:
     return np.minimum(volts, robot.drive.supply)
 
 
+def largest_speed(robot: Robot) -> FloatArray:
+    """What an action of 1 is of a drive with a speed loop [rad/s]: the speed without load at the limit. (wheels,)."""
+    return no_load_speed(robot.motor, per_wheel(robot.motor.voltage_limit, robot.wheels.count))
+
+
+def loop_rows(robots: Sequence[Robot]) -> FloatArray:
+    """The numbers of speed loops: LOOP of each wheel. Shape (wheels LOOP, robots)."""
+    columns = []
+    for robot in robots:
+        kp, ki, limit, radius = loop_gains(robot)
+        rims = robot.wheels.wrench_matrix / radius
+        columns.append(np.stack([kp, ki / float(robot.drive.rate or np.inf), limit, *rims], axis=1).reshape(-1))
+    return np.array(columns).T
+
+
 def rows_of(
-    parameters: BatchParameters, law: int, turning: Any, voltage: FloatArray, pieces: FloatArray, dtype: Any
+    parameters: BatchParameters,
+    law: int,
+    turning: Any,
+    voltage: FloatArray,
+    pieces: FloatArray,
+    dtype: Any,
+    loops: FloatArray | None = None,
 ) -> FloatArray:
     """The numbers of robots. Shape (robots, rows).
 
@@ -188,14 +208,24 @@ def rows_of(
         voltage: What an action of 1 is [V], (wheels,).
         pieces: Lengths whose phi is needed [s], shape (pieces,).
         dtype: Of the rows.
+        loops: Of `loop_rows`, where there are speed loops.
     """
     mass, push = parameters.mass, (parameters.push * voltage[:, None]).swapaxes(0, 1)  # (wheels, 3, n)
+    between = np.zeros((0, parameters.count)) if loops is None else loops
     if law == EXACT_LAW:
         rate = parameters.damping / mass
         held = [-np.expm1(-rate * length) / rate for length in pieces]
-        columns = [parameters.coulomb / mass, parameters.breakaway / mass, rate, 1.0 / mass, *held, *(push / mass)]
+        columns = [
+            parameters.coulomb / mass,
+            parameters.breakaway / mass,
+            rate,
+            1.0 / mass,
+            *held,
+            between,
+            *(push / mass),
+        ]
     else:
         frame = np.zeros((3 * len(pieces), parameters.count))
         frame[0] = np.where(turning, parameters.body_mass, 0.0)
-        columns = [parameters.coulomb, parameters.damping, mass, np.ones_like(mass), frame, *push]
+        columns = [parameters.coulomb, parameters.damping, mass, np.ones_like(mass), frame, between, *push]
     return np.ascontiguousarray(np.concatenate(columns).T, dtype=dtype)

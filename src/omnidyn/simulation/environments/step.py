@@ -10,6 +10,7 @@ from omnidyn.simulation.batch.implicit import LAW, TURNING
 from omnidyn.simulation.batch.pose import SHARE
 from omnidyn.simulation.environments.block_motion import (
     add_push,
+    close_loops,
     copy_row,
     copy_rows,
     face,
@@ -26,6 +27,7 @@ from omnidyn.simulation.environments.layout import (
     EXACT_LAW,
     GOAL,
     LATER,
+    LOOP,
     MEMBER,
     NEXT_STEP,
     PATH,
@@ -77,7 +79,7 @@ def begin_episode(numbers, state, b, n, action):
         state.pose[b, j, n] = numbers.path[state.start[b, n], j] + off if numbers.task == PATH else kind(0)
         state.places[b, 0, j, n] = state.pose[b, j, n]
     for wheel in range(len(action)):
-        action[wheel, n] = 0
+        action[wheel, n] = state.loops[b, wheel, n] = 0
         for k in range(state.past.shape[1]):
             state.past[b, k, wheel, n] = 0
 
@@ -103,8 +105,8 @@ def take_action(out, action, first):
 
 @inlined
 def move(numbers, state, b, now, action, rooms):
-    """A block over a step: all pieces of it. action, acting: (wheels, W); room (6, W); work; the other rooms (3, W)."""
-    twist, mean, drive, acting, room, work = rooms
+    """A block over a step: all pieces of it. action, acting, volts: (wheels, W); room (6, W); work; the other rooms (3, W)."""
+    twist, mean, drive, acting, volts, room, work = rooms
     robots, past = state.robots[b], state.past[b]
     gain, late = first_gain(robots, len(action)), numbers.lags[0] > 0
     copy_rows(twist, state.twist[b])
@@ -117,13 +119,21 @@ def move(numbers, state, b, now, action, rooms):
     for piece in range(len(numbers.lags)):
         lag = numbers.lags[piece]
         copy_rows(acting, past[(now - lag) % len(past)] if lag else action)
-        put_drive(drive, acting, robots, gain, numbers.dead)
-        if numbers.pushed:
-            add_push(drive, state.push[b], robots)
-        if numbers.travels or numbers.law != EXACT_LAW:
-            travel(numbers, work, twist, mean, room, drive, robots, piece)
-        else:
-            slide(twist, drive, robots, phi_of(piece), numbers.substeps)
+        ticks = numbers.ticks[piece]
+        substeps = numbers.substeps[piece] // max(ticks, 1)
+        for _ in range(max(ticks, 1)):
+            if ticks:
+                first, largest = gain - LOOP * len(action), numbers.largest
+                close_loops(volts, state.loops[b], acting, twist, robots, first, largest, drive.dtype.type(0))
+                put_drive(drive, volts, robots, gain, numbers.dead)
+            else:
+                put_drive(drive, acting, robots, gain, numbers.dead)
+            if numbers.pushed:
+                add_push(drive, state.push[b], robots)
+            if numbers.travels or numbers.law != EXACT_LAW:
+                travel(numbers, work, twist, mean, room, drive, robots, piece, substeps)
+            else:
+                slide(twist, drive, robots, phi_of(piece), substeps)
     if late:
         copy_rows(past[now % len(past)], action)
     copy_rows(state.twist[b], twist)
@@ -176,8 +186,11 @@ def change(numbers, state, b):
 @inlined
 def judge(numbers, state, b, buffers, row, reached):
     """Reward and end of the steps of a block; whether an episode ends, or has ended a step ago."""
-    put_reward(numbers, row, reached, state.twist[b], state.pose[b], state.goal[b], state.start[b], state.count[b])
     first, last = b * W, b * W + W
+    terms = buffers.travel[first:last], buffers.turn[first:last], buffers.success[first:last]
+    put_reward(
+        numbers, row, reached, terms, state.twist[b], state.pose[b], state.goal[b], state.start[b], state.count[b]
+    )
     reward, terminated, truncated = (
         buffers.reward[first:last],
         buffers.terminated[first:last],
@@ -202,7 +215,8 @@ def begin_again(numbers, state, b, buffers, action):
         if numbers.autoreset == NEXT_STEP and state.ended[b, n]:
             begin_episode(numbers, state, b, n, action)
             buffers.reward[robot] = 0
-            buffers.terminated[robot] = buffers.truncated[robot] = 0
+            buffers.travel[robot] = buffers.turn[robot] = 0
+            buffers.terminated[robot] = buffers.truncated[robot] = buffers.success[robot] = 0
         elif numbers.autoreset == SAME_STEP and (buffers.terminated[robot] | buffers.truncated[robot]):
             for column in range(len(buffers.final)):
                 buffers.final[column, robot] = buffers.observation[column, robot]
@@ -221,7 +235,7 @@ def step_blocks(first, last, now, numbers, state, action, buffers):
     work = np.zeros((LAW + TURNING + 1, W), dtype)
     for n in range(W):
         work[SHARE, n] = 1
-    rooms = (twist, mean, drive, acting, np.zeros((6, W), dtype), work)
+    rooms = (twist, mean, drive, acting, np.zeros((len(action), W), dtype), np.zeros((6, W), dtype), work)
     row, reached = np.zeros(W, dtype), np.zeros(W, np.uint8)
     for b in range(first, last):
         take_action(taken, action, b * W)

@@ -10,7 +10,8 @@ Way and turn are those of the pose that is measured, which may be old. The rewar
     velocity   -(e_x^2 + e_y^2 + (b e_omega)^2) [m^2/s^2]        pose, path   -(e_x^2 + e_y^2 + (b e_heading)^2) [m^2]
 
 with b = ARM, a length that makes an angle a way. An episode ends early in one case only: a robot that stands at its
-goal, within NEAR_PLACE, NEAR_HEADING and NEAR_SPEED, has reached it.
+goal, within NEAR_PLACE, NEAR_HEADING and NEAR_SPEED, has reached it. Success is that; of a velocity an error within
+NEAR_SPEED, of a path one within NEAR_PLACE and NEAR_HEADING.
 """
 
 from __future__ import annotations
@@ -29,21 +30,28 @@ TURN = 2.0 * math.pi
 
 
 @inlined
-def put_reward(numbers, reward, reached, twist, pose, goal, start, count):
-    """Fill reward and reached (W,), from the twist, or the pose, against a goal or the path. Shapes (3, W)."""
+def put_reward(numbers, reward, reached, terms, twist, pose, goal, start, count):
+    """Fill reward, reached and terms (W,), from the twist, or the pose, against a goal or the path. Shapes (3, W).
+
+    terms: what travel and turn add to the reward, and success.
+    """
+    travel, turn, success = terms
+    near = reward.dtype.type(NEAR_SPEED)
     arm = reward.dtype.type(ARM * ARM)
     if numbers.task == VELOCITY:
         v_x, v_y, omega, to_x, to_y, to_omega = twist[0], twist[1], twist[2], goal[0], goal[1], goal[2]
         for n in range(W):
             x, y, yaw = v_x[n] - to_x[n], v_y[n] - to_y[n], omega[n] - to_omega[n]
-            reward[n] = -(x * x + y * y + arm * yaw * yaw)
+            off, turned = x * x + y * y, arm * yaw * yaw
+            travel[n], turn[n], reward[n] = -off, -turned, -(off + turned)
+            success[n] = (off < near * near) & (turned < near * near)
     else:
         for n in range(W):
-            put_pose_reward(numbers, reward, reached, twist, pose, goal, start, count, n)
+            put_pose_reward(numbers, reward, reached, terms, twist, pose, goal, start, count, n)
 
 
 @part
-def put_pose_reward(numbers, reward, reached, twist, pose, goal, start, count, n):
+def put_pose_reward(numbers, reward, reached, terms, twist, pose, goal, start, count, n):
     """The same for robot n of a block, whose pose counts."""
     kind = reward.dtype.type
     arm = kind(ARM * ARM)
@@ -53,11 +61,14 @@ def put_pose_reward(numbers, reward, reached, twist, pose, goal, start, count, n
         at_x, at_y, at_angle = numbers.path[now, 0], numbers.path[now, 1], numbers.path[now, 2]
     turn = np.float64(at_angle) - np.float64(pose[2, n])
     x, y, yaw = at_x - pose[0, n], at_y - pose[1, n], kind(turn - TURN * np.round(turn / TURN))
-    reward[n] = -(x * x + y * y + arm * yaw * yaw)
+    off, turned = x * x + y * y, arm * yaw * yaw
+    terms[0][n], terms[1][n], reward[n] = -off, -turned, -(off + turned)
+    far = math.sqrt(np.float64(off))
+    terms[2][n] = (far < NEAR_PLACE) & (abs(yaw) < NEAR_HEADING)
     if numbers.task == POSE:
         speed = math.sqrt(np.float64(twist[0, n] ** 2 + twist[1, n] ** 2 + arm * twist[2, n] ** 2))
-        far = math.sqrt(np.float64(x * x + y * y))
-        reached[n] = (far < NEAR_PLACE) & (abs(yaw) < NEAR_HEADING) & (speed < NEAR_SPEED)
+        reached[n] = terms[2][n] & (speed < NEAR_SPEED)
+        terms[2][n] = reached[n]
 
 
 @part

@@ -19,6 +19,7 @@ import omnidyn
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.model.actuation import reaching
+from omnidyn.model.deadzone import axis_patterns, breakaway_voltage
 from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.dynamics import friction_wrench, settled_currents
 from omnidyn.model.keys import WHEELS, Key, friction_keys
@@ -56,7 +57,7 @@ class DrivenRobot:
         check_supply(robot, None)
         self.file, self.robot, self.varied = robot, robot, dict.fromkeys(VARIED, "")
         self.folder, self.tell, self.commands = folder, tell, commands
-        self.patterns = omnidyn.axis_patterns(robot)
+        self.patterns = axis_patterns(robot)
         self.axes, self.level, self.offset = np.zeros(3), 0.0, np.zeros(robot.wheels.count)
         self.live = LiveRobot(robot, DT)
         self.rows: list[tuple[FloatArray, ...]] | None = None
@@ -148,7 +149,7 @@ class DrivenRobot:
         """Volts of the pattern of each axis at which the robot begins to move; None where no voltage tells."""
         if self.robot.drive.kind == SPEED or self.robot.floor.tilt or self.robot.wheels.traction_mu is not None:
             return [None] * 3
-        volts = omnidyn.breakaway_voltage(self.robot, self.patterns)
+        volts = breakaway_voltage(self.robot, self.patterns)
         return [float(value) if np.isfinite(value) else None for value in volts]
 
     def _command(self) -> FloatArray:

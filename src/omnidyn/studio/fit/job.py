@@ -18,6 +18,7 @@ from omnidyn.identification.identification import Identification
 from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.prepare import free_by_default, guesses
+from omnidyn.logs.read_log import recorded_log
 from omnidyn.model.keys import EMF, ROTOR, TORQUE, Key, find_key, in_words, unit
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
@@ -54,7 +55,7 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     folder, robot = Path(request["folder"]), robot_of(request)
     folder.mkdir(parents=True)
     listen(Report("reading"))
-    logs = [omnidyn.load_log(log["path"], robot, options_of(log)) for log in request["logs"]]
+    logs = [recorded_log(log["path"], robot, options_of(log)) for log in request["logs"]]
     free = tuple(request.get("free") or ())
     result = omnidyn.identify(
         [log.to_run() for log in logs],

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 import omnidyn
-from omnidyn.control.instruments import told
-from omnidyn.control.paths.curve import path_of_file, through
 from omnidyn.control.paths.motion import Path
-from omnidyn.control.tracking import Trackings, trackings_document
+from omnidyn.control.paths.polyline import path_of_file, through
+from omnidyn.control.readings import with_sensors
+from omnidyn.control.tracking import Tracking, trackings_document
 from omnidyn.document import plain
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
@@ -45,7 +45,7 @@ def _tracked(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     sensors, path = request["sensors"] or None, _path(request, folder)
     trackings = omnidyn.track(robot, path, request["controllers"], plant=plant, sensors=sensors, progress=listen)
     listen(Report("drawing"))
-    demand = omnidyn.path_demand(told(robot, sensors), path)
+    demand = omnidyn.path_demand(with_sensors(robot, sensors), path)
     for k, tracking in enumerate(trackings):
         omnidyn.write_run(tracking.run, folder / f"run-{k + 1}.csv")
     (folder / MOTION).write_text(json.dumps(_motion(trackings, plant)), "utf-8")
@@ -66,7 +66,7 @@ def _path(request: Mapping[str, Any], folder: FilePath) -> Path:
     return omnidyn.path(request["path"])
 
 
-def _motion(trackings: Trackings, robot: Robot) -> dict[str, Any]:
+def _motion(trackings: Tracking, robot: Robot) -> dict[str, Any]:
     """What the animation shows: poses [m, m, rad], distances from the path [mm], over time [s]; the robot [m]."""
     first = trackings[0]
     rows = np.unique(np.linspace(0, len(first.run) - 1, min(len(first.run), MAX_FRAMES)).astype(int))
@@ -84,7 +84,7 @@ def _motion(trackings: Trackings, robot: Robot) -> dict[str, Any]:
     )
 
 
-def _write_signals(trackings: Trackings, folder: FilePath) -> None:
+def _write_signals(trackings: Tracking, folder: FilePath) -> None:
     """Errors and voltages over time, a panel each, all controllers in each panel."""
     names = [tracking.controller for tracking in trackings]
     volts = [np.asarray(tracking.run.voltage).T for tracking in trackings]

@@ -10,7 +10,7 @@ import pytest
 
 import omnidyn
 from omnidyn.control.controllers import ControllerFile, controller_named, save_controller
-from omnidyn.control.mpc.riccati import CP, CV, GX, GY, HP, HV, PULL, WEIGHT, E, V
+from omnidyn.control.mpc.columns import CP, CV, GX, GY, HP, HV, PULL, WEIGHT, E, V
 from omnidyn.control.paths.path import path
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.code.c_controller import c_controller
@@ -52,7 +52,7 @@ VARIANTS = {
     "a loop with a sum, no observer": (ROBOT.replace(drive=SUMMED.replace(latency=0.0)), {"observer": False}),
     "a loop with a sum, speeds that are means": (ROBOT.replace(drive=SUMMED, sensors=MEAN), {}),
 }
-OK, LIMITED, STILL, BACKWARDS, BAD_TIME, BAD_POSE, BAD_TWIST, BAD_PATH = range(8)
+OK, LIMITED, STILL, SWINGS, BACKWARDS, BAD_TIME, BAD_POSE, BAD_TWIST, BAD_PATH = range(9)
 
 
 def controller_file(folder, options):
@@ -186,7 +186,7 @@ def test_nothing_that_is_no_step_gets_through(tmp_path):
 def test_it_is_small_and_asks_for_no_memory(tmp_path, capsys):
     c_controller(ROBOT, controller="mpc").write(tmp_path / "c")
     (tmp_path / "c" / "size.c").write_text('#include "omnidyn_control.h"\nomnidyn_control one;\n')
-    without = ["-DOMNIDYN_MOST_BRIDGED=0", "-DOMNIDYN_ELAPSED=0", "-DOMNIDYN_FEW_KNOCKS=0"]
+    without = ["-DOMNIDYN_MOST_BRIDGED=0", "-DOMNIDYN_ELAPSED=0", "-DOMNIDYN_FEW_KNOCKS=0", "-DOMNIDYN_SWING=0"]
     for options, most, most_memory in ((without, 8192, 11 * 1024), ([], 12288, 11776)):
         for name in ("omnidyn_control", "size"):
             command = ["gcc", *STRICT, "-Os", "-fstack-usage", *options, "-c", f"{name}.c"]

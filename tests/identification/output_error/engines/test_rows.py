@@ -27,7 +27,7 @@ def logs(robot):
 @pytest.mark.parametrize("groups", [None, ("a", "b")], ids=["alone", "joint"])
 def test_the_rows_of_an_engine_add_up_to_its_sums(robot, groups):
     fit = Fit.of(list(logs(robot)), robot, OutputError(), groups)
-    solver = fit._solver(None)
+    solver = fit.solver(None)
     start = solver.problem.start()
     point = type(start)(start.values * 1.02 + 1e-4, start.states)
     variance = np.linspace(1.0, 2.0, len(solver.problem.columns))

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from benchmarks.forces import FIRST_SEED, pushed
+from benchmarks.identification.forces import FIRST_SEED, pushed
 from benchmarks.wrong_worlds.log import right_case, robot_of, voltages
 from benchmarks.wrong_worlds.remedies import FRICTION
 from omnidyn.identification.methods import OutputError

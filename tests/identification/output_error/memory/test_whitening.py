@@ -115,7 +115,7 @@ def test_what_the_fit_has_swallowed_is_counted(axebot, clean):
 def test_the_engine_filters_residuals_and_slopes_alike(axebot, clean):
     """The sums of filtered rows are products with the inverse of the dense covariance."""
     short = Run(t=clean.t[:200], voltage=clean.voltage[:200], twist=noisy(clean, 1).twist[:200])
-    solver = Fit.of(short, axebot, OutputError(nuisances=(), start="rest"))._solver(())
+    solver = Fit.of(short, axebot, OutputError(nuisances=(), start="rest")).solver(())
     model = AutoRegression(np.array([0.6, 0.3]), 1.0, 1)
     engine = WhitenedEngine(solver.engine, {("twist", 0): model})
     point = solver.problem.start()

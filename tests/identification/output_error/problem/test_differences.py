@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from benchmarks.coloured import TICK, counted
+from benchmarks.identification.coloured import TICK, counted
 from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import TICK as TICKS
 from benchmarks.wrong_worlds.log import logged, right_case

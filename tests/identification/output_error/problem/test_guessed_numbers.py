@@ -15,8 +15,8 @@ def test_a_rotor_that_is_not_there_costs_no_more_than_its_prior_says():
     """On a logarithmic scale 0 is infinitely far, and a robot without rotors kept 1 % of mass of the guess."""
     mean = float(np.mean(first_guess("mine", FOUR, 6.0, 12.0).motor.rotor_inertia))
     rotor = robot_parameter(first_guess("mine", FOUR, 6.0, 12.0), ROTOR, (mean, mean))
-    assert rotor.known is not None
-    centre, std = rotor.known
+    assert rotor.inner_prior is not None
+    centre, std = rotor.inner_prior
     assert abs((rotor.inner(rotor.low) - centre) / std) <= 1.0
     assert rotor.low < 0.01 * mean
 

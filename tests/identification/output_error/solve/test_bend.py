@@ -59,11 +59,11 @@ def test_what_stands_still_has_no_bend_and_what_is_forgotten_none():
     for at in (np.zeros(COUNT), np.array([1.0, 0.0, 0.0, 0.5])):
         bend.learn(at, -hessian @ at, information)
     still = np.array([True, False, False, False])
-    assert bend.known
+    assert bend.has_curvature
     assert bend.beside(information, still)[:, 0].tolist() == [0.0] * COUNT
     assert bend.beside(information, still)[3, 3] != 0.0
     bend.forget()
-    assert not bend.known
+    assert not bend.has_curvature
     assert not bend.beside(information, ALL).any()
 
 

@@ -9,7 +9,7 @@ import scipy.io
 
 import omnidyn
 from omnidyn.errors import InputError
-from omnidyn.logs.read_log import load_log, read_log
+from omnidyn.logs.read_log import read_log, recorded_log
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.run_file import run_columns, write_run
 from omnidyn.run import CHANNELS, Run
@@ -50,7 +50,7 @@ def test_the_columns_of_a_run_file_are_the_run(write):
 
 def test_matrices_are_one_column_per_wheel(write):
     speed = np.random.default_rng(0).normal(size=(50, 3))
-    log = load_log(write(t=T, w=speed, u_V=3.0 * speed, gain=2.0))
+    log = recorded_log(write(t=T, w=speed, u_V=3.0 * speed, gain=2.0))
     assert np.array_equal(log.channels["wheel_speed"], speed)
     assert np.array_equal(log.channels["voltage"], 3.0 * speed)
     assert np.array_equal(log.t, T)
@@ -58,7 +58,7 @@ def test_matrices_are_one_column_per_wheel(write):
 
 def test_a_matrix_that_lies_on_its_side_is_turned(tmp_path):
     speed = np.random.default_rng(0).normal(size=(50, 3))
-    log = load_log(mat5(tmp_path / "a.mat", t=T[None, :], w=speed.T))
+    log = recorded_log(mat5(tmp_path / "a.mat", t=T[None, :], w=speed.T))
     assert np.array_equal(log.channels["wheel_speed"], speed)
 
 
@@ -67,7 +67,7 @@ def test_structs_with_times_of_their_own_keep_them(write):
     path = write(
         wheels={"t": T, "w": np.ones((50, 3))}, odom={"t": slow, "vx": slow, "vy": 0 * slow, "omega": 0 * slow}
     )
-    log = load_log(path)
+    log = recorded_log(path)
     known = np.isfinite(log.channels["twist"][:, 0])
     assert known.sum() == 10
     assert np.array_equal(log.t[known], np.rint(slow * 1e9) / 1e9)
@@ -88,7 +88,7 @@ def test_an_array_of_structs_of_single_numbers_is_a_table(tmp_path):
     rows = np.zeros(20, dtype=[("t_s", object), ("w1", object)])
     for k in range(20):
         rows[k] = 0.01 * k, 2.0 * k
-    log = load_log(mat5(tmp_path / "a.mat", log=rows))
+    log = recorded_log(mat5(tmp_path / "a.mat", log=rows))
     assert np.array_equal(log.channels["wheel_speed"][:, 0], 2.0 * np.arange(20))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.logs.read_log import load_log
+from omnidyn.logs.read_log import recorded_log
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.readers.reader import ReadOptions
 from omnidyn.logs.readers.ros.bags import read_bag
@@ -120,5 +120,5 @@ def test_a_folder_without_metadata_is_no_bag(tmp_path):
 
 
 def test_a_bag_is_a_log(tmp_path):
-    log = load_log(write_ros2(drive(BagMaker(), 0.5), tmp_path / "bag"))
+    log = recorded_log(write_ros2(drive(BagMaker(), 0.5), tmp_path / "bag"))
     assert {"wheel_speed", "twist", "twist_command", "supply"} <= set(log.channels)

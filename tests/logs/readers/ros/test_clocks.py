@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import omnidyn
+from omnidyn.logs.read_log import recorded_log
 from omnidyn.logs.readers.ros.clocks import Clocked, trusted
 from tests.support.bags import BagMaker, write_mcap
 
@@ -276,7 +277,7 @@ def test_only_what_was_lost_is_lost_at_any_pace(tmp_path, seed):
     for k, wall in zip(kept, receive, strict=True):
         maker.odometry(true[k] / S, (0.01 * k, 0.0, 0.0), (0.3, 0.0, 0.0))
         maker.said[-1].receive = int(wall)
-    log = omnidyn.load_log(write_mcap(maker, tmp_path / "log.mcap"))
+    log = recorded_log(write_mcap(maker, tmp_path / "log.mcap"))
     np.testing.assert_allclose(log.t - log.t[0], (true[kept] - true[0]) / S, atol=2e-6)
     np.testing.assert_allclose(log.channels["pose"][:, 0], 0.01 * kept)
     gaps = omnidyn.check(log).of("gap")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.logs.read_log import load_log
+from omnidyn.logs.read_log import recorded_log
 from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.readers.reader import ReadOptions
 from omnidyn.logs.readers.recording import Recording, Track
@@ -39,7 +39,7 @@ def seen(path, name):
 
 @pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
 def test_the_usual_topics_are_mapped(tmp_path, compression):
-    log = load_log(write_mcap(drive(BagMaker(), 1.0), tmp_path / "a.mcap", compression))
+    log = recorded_log(write_mcap(drive(BagMaker(), 1.0), tmp_path / "a.mcap", compression))
     assert set(log.channels) == {"twist", "twist_command", "pose", "supply", "wheel_angle", "wheel_speed"}
     assert said(log.columns.doubts) == ()
     assert log.columns.unused == ()
@@ -80,7 +80,7 @@ def test_joints_are_known_by_name_in_any_order_and_arrays_may_be_empty(tmp_path)
     maker.joints(0.2, WHEELS, [], [0.7, 0.8, 0.9])
     maker.joints(0.3, [WHEELS[1]], [9.0], [])
     maker.joints(0.4, [], [], [])
-    log = load_log(write_mcap(maker, tmp_path / "a.mcap"))
+    log = recorded_log(write_mcap(maker, tmp_path / "a.mcap"))
     nan = np.nan
     assert np.array_equal(log.channels["wheel_speed"][:3], [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]])
     angles = [[1, 2, 3], [4, 5, 6], [nan] * 3, [nan, 9, nan]]
@@ -91,7 +91,7 @@ def test_wheels_whose_names_do_not_count_are_asked_for(tmp_path):
     maker = BagMaker()
     for k in range(5):
         maker.joints(0.1 * k, ["red_wheel", "green_wheel", "blue_wheel"], [0, 0, 0], [1.0 * k, 2, 3])
-    log = load_log(write_mcap(maker, tmp_path / "a.mcap"))
+    log = recorded_log(write_mcap(maker, tmp_path / "a.mcap"))
     assert "wheel_speed" not in log.channels
     assert any(
         "/joint_states/red_wheel/velocity" in words and "which wheel each is" in words
@@ -103,7 +103,7 @@ def test_wheels_whose_names_say_where_they_stand_are_numbered_by_place(tmp_path)
     maker = BagMaker()
     for k in range(5):
         maker.joints(0.1 * k, ["front_left_wheel", "front_right_wheel", "rear_wheel"], [0, 0, 0], [1.0 * k, 2, 3])
-    log = load_log(write_mcap(maker, tmp_path / "a.mcap"))
+    log = recorded_log(write_mcap(maker, tmp_path / "a.mcap"))
     assert np.array_equal(log.channels["wheel_speed"], [[1.0 * k, 3, 2] for k in range(5)])
     assert any("/joint_states/rear_wheel/position is wheel 2" in words for words in said(log.notes))
 
@@ -112,7 +112,7 @@ def test_joints_that_are_no_wheels_do_not_shift_the_wheels(tmp_path):
     maker = BagMaker()
     for k in range(5):
         maker.joints(0.1 * k, ["arm_4", "wheel0", "wheel1", "wheel2"], [0] * 4, [9.0, 1.0 * k, 2, 3])
-    log = load_log(write_mcap(maker, tmp_path / "a.mcap"))
+    log = recorded_log(write_mcap(maker, tmp_path / "a.mcap"))
     assert np.array_equal(log.channels["wheel_speed"][:, 0], np.arange(5.0))
     assert log.wheels == 3
 
@@ -161,7 +161,7 @@ def test_a_custom_message_is_read_by_the_definition_in_the_bag(tmp_path):
     path = write_mcap(maker, tmp_path / "a.mcap")
     assert np.array_equal(seen(path, "/motors/current_A[0]")[1], np.arange(6.0))
     assert np.array_equal(seen(path, "/motors/ticks[1]")[1], -np.arange(6.0))
-    log = load_log(path)
+    log = recorded_log(path)
     assert np.array_equal(log.channels["current"], [[k, 2, 3] for k in range(6)])
 
 
@@ -171,9 +171,9 @@ def test_namespaces_and_two_robots(tmp_path):
         one.odometry(0.1 * k, (0, 0, 0), (1.0, 0, 0), topic="/robot1/odom")
         two.odometry(0.1 * k, (0, 0, 0), (1.0, 0, 0), topic="/robot1/odom")
         two.odometry(0.1 * k, (0, 0, 0), (2.0, 0, 0), topic="/robot2/odom")
-    log = load_log(write_mcap(one, tmp_path / "one.mcap"))
+    log = recorded_log(write_mcap(one, tmp_path / "one.mcap"))
     assert (log.channels["twist"][:, 0] == 1.0).all()
-    log = load_log(write_mcap(two, tmp_path / "two.mcap"))
+    log = recorded_log(write_mcap(two, tmp_path / "two.mcap"))
     assert "twist" not in log.channels
     assert any("/robot1/odom/vx" in words and "/robot2/odom" in words for words in said(log.columns.doubts))
 
@@ -253,7 +253,7 @@ def test_a_truncated_file_is_read_to_its_last_whole_record(tmp_path):
     assert recording.salvaged is not None
     assert 50 < recording.salvaged < 314
     assert f"{recording.salvaged} messages before that were read" in said(recording.notes)[0]
-    log = load_log(cut)
+    log = recorded_log(cut)
     assert np.isfinite(log.channels["wheel_speed"]).all(axis=1).sum() == next(
         topic.count for topic in recording.topics if topic.name == "/joint_states"
     )
@@ -317,8 +317,8 @@ def test_an_mcap_in_any_order_is_read_in_the_order_of_time(tmp_path, way):
         "chunks": base[2 * quarter :] + base[quarter : 2 * quarter] + base[:quarter],
         "by topic": sorted(base, key=lambda each: each.topic),
     }
-    want = load_log(write_mcap(maker, tmp_path / "a.mcap", chunk=2**12)).to_run()
-    run = load_log(write_mcap(maker, tmp_path / "b.mcap", chunk=2**12, order=orders[way])).to_run()
+    want = recorded_log(write_mcap(maker, tmp_path / "a.mcap", chunk=2**12)).to_run()
+    run = recorded_log(write_mcap(maker, tmp_path / "b.mcap", chunk=2**12, order=orders[way])).to_run()
     assert np.array_equal(run.t, want.t)
     turns = (run.pose[:, 2] - want.pose[:, 2]) / (2.0 * np.pi)  # whole ones, the same everywhere
     assert np.ptp(turns[np.isfinite(turns)]) == pytest.approx(0.0, abs=1e-12)

@@ -5,7 +5,7 @@ import pytest
 
 import omnidyn
 from omnidyn.logs.plateaus import find_plateaus
-from omnidyn.logs.read_log import load_log
+from omnidyn.logs.read_log import recorded_log
 from omnidyn.model.wheels import wheel_speed
 from tests.support.axebot_logs import TRUTH
 
@@ -61,7 +61,7 @@ def test_the_fit_takes_each_sensor_where_it_measured(path):
 
 
 def test_check_finds_nothing_to_heed(path):
-    verdict = omnidyn.check(load_log(path, omnidyn.load_robot("axebot")), omnidyn.load_robot("axebot"))
+    verdict = omnidyn.check(recorded_log(path, omnidyn.load_robot("axebot")), omnidyn.load_robot("axebot"))
     assert {finding.severity for finding in verdict.findings} <= {"note"}
 
 
@@ -106,6 +106,6 @@ def test_the_steps_of_a_slow_sensor_are_those_that_it_made(tmp_path):
         speed = 4.0 * np.sin(k * 1e-3 + np.arange(3.0)) + rng.normal(0.0, 0.1, 3)
         maker.joints(k * 1e-3, ["wheel_1", "wheel_2", "wheel_3"], [], np.round(speed / step) * step)
     robot = omnidyn.load_robot("axebot")
-    verdict = omnidyn.check(load_log(write_mcap(maker, tmp_path / "slow.mcap"), robot), robot)
+    verdict = omnidyn.check(recorded_log(write_mcap(maker, tmp_path / "slow.mcap"), robot), robot)
     (finding,) = [each for each in verdict.findings if each.code == "quantised"]
     assert finding.numbers["step"] == pytest.approx(step)

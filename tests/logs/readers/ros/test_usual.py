@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.logs.read_log import load_log
+from omnidyn.logs.read_log import recorded_log
 from omnidyn.logs.readers.ros.usual import heading_of, wheel_numbers
 
 pytest.importorskip("rosbags")
@@ -60,11 +60,11 @@ def test_a_gyroscope_gives_the_turn_rate_where_no_odometry_does(tmp_path):
     for k in range(10):
         maker.imu(0.01 * k, 0.5 * k)
         maker.joints(0.01 * k, ["wheel_1", "wheel_2"], [], [1.0 * k, 2.0])
-    log = load_log(write_mcap(maker, tmp_path / "a.mcap"))
+    log = recorded_log(write_mcap(maker, tmp_path / "a.mcap"))
     assert np.array_equal(log.channels["twist"][:, 2], 0.5 * np.arange(10))
     for k in range(10):
         maker.odometry(0.01 * k, (0, 0, 0), (1.0, 0.0, 7.0))
-    log = load_log(write_mcap(maker, tmp_path / "b.mcap"))
+    log = recorded_log(write_mcap(maker, tmp_path / "b.mcap"))
     assert (log.channels["twist"][:, 2] == 7.0).all()
     assert any("omega of /imu/data are not taken: /odom gives them" in note for note in said(log.notes))
 
@@ -74,11 +74,11 @@ def test_a_transform_gives_the_pose_where_nothing_else_does(tmp_path):
     for k in range(10):
         maker.tf(0.05 * k, ("base_link", "laser", 9.0, 9.0, 1.0), ("map", "odom", 5.0, 5.0, 1.0))
         maker.tf(0.05 * k + 0.01, ("robot1/odom", "robot1/base_link", 0.1 * k, -0.1 * k, 0.9 * k))
-    log = load_log(write_mcap(maker, tmp_path / "a.mcap"))
+    log = recorded_log(write_mcap(maker, tmp_path / "a.mcap"))
     np.testing.assert_allclose(log.channels["pose"], np.arange(10)[:, None] * [0.1, -0.1, 0.9], rtol=2e-15, atol=1e-15)
     for k in range(10):
         maker.pose_stamped(0.05 * k, 1.0, 2.0, 0.0)
-    log = load_log(write_mcap(maker, tmp_path / "b.mcap"))
+    log = recorded_log(write_mcap(maker, tmp_path / "b.mcap"))
     known = np.isfinite(log.channels["pose"][:, 0])
     assert np.array_equal(log.channels["pose"][known], np.tile([1.0, 2.0, 0.0], (10, 1)))
 
@@ -89,7 +89,7 @@ def test_a_twist_is_a_command_where_its_topic_says_so(tmp_path, stamped):
     for k in range(10):
         maker.twist(0.1 * k, (0.1 * k, 0.0, 0.0), "/robot1/cmd_vel", stamped)
         maker.twist(0.1 * k, (0.2 * k, 0.0, 0.0), "/robot1/vision/velocity", stamped)
-    log = load_log(write_mcap(maker, tmp_path / "a.mcap"))
+    log = recorded_log(write_mcap(maker, tmp_path / "a.mcap"))
     for channel, size in (("twist_command", 0.1), ("twist", 0.2)):
         values = log.channels[channel][:, 0]
         assert np.array_equal(values[np.isfinite(values)], size * np.arange(10))

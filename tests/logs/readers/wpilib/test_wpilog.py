@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.logs.read_log import load_log, read_log
+from omnidyn.logs.read_log import read_log, recorded_log
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.readers.reader import ReadOptions
 from omnidyn.logs.readers.wpilog import read_wpilog
@@ -136,7 +136,7 @@ def test_structs_are_read_by_the_schemas_in_the_log(tmp_path):
             lost.append(b"\x12", t)
 
     path = write(tmp_path / "a.wpilog", fill)
-    log, table = load_log(path), read_table(path)
+    log, table = recorded_log(path), read_table(path)
     assert np.array_equal(log.channels["pose"], np.arange(10)[:, None] * [0.1, -0.2, 0.3])
     assert np.array_equal(log.channels["twist_command"][:, 2], 0.1 * np.arange(10))
     assert np.array_equal(table.numbers("/modules[1]/speed"), np.arange(10) + 0.5)

@@ -463,7 +463,7 @@ int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3],
                          const omnidyn_motion path[OMNIDYN_HORIZON + 1], float output[OMNIDYN_WHEELS])
 {
     const int known = c->known && elapsed > 0.5f * OMNIDYN_DT && elapsed < LONGEST * OMNIDYN_DT;
-    int i, j, says = OMNIDYN_OK, bridged = OMNIDYN_OK;
+    int i, j, says = OMNIDYN_OK, bridged = OMNIDYN_OK, swinging = 0;
     if (c->begun && elapsed == 0.0f) {
         memcpy(output, c->last, sizeof(c->last));
         return OMNIDYN_STILL;
@@ -506,6 +506,11 @@ int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3],
         hold_for(c, known ? elapsed : OMNIDYN_DT);
 #endif
         control(c, pose, twist, path, known);
+#if OMNIDYN_SWING
+        if (bridged == OMNIDYN_OK) {
+            swinging = swings(&c->swing, elapsed, pose[2], twist, path[0].velocity);
+        }
+#endif
         if (!sane(c->x[1], 6)) {
             says = OMNIDYN_FAILED;
         }
@@ -537,5 +542,5 @@ int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3],
         volts *= PER_VOLT(i);
         c->last[i] = output[i] = within(volts, OUTPUT_LIMIT(i));
     }
-    return c->known && bridged ? bridged : says;
+    return c->known && bridged ? bridged : c->known && swinging ? OMNIDYN_SWINGS : says;
 }

@@ -175,8 +175,8 @@ class Linear:
         parameters = self.rows.problem.parameters
         values = np.zeros((len(parameters), 1 + len(parameters)))
         for i, (p, value) in enumerate(zip(parameters, self.rows.point.values, strict=True)):
-            if p.known is not None:
-                mean, std = p.known
+            if p.inner_prior is not None:
+                mean, std = p.inner_prior
                 values[i, 0], values[i, 1 + i] = (mean - p.inner(float(value))) / std, 1.0 / std
         return values
 
@@ -274,7 +274,7 @@ class Linear:
         column_limit = max(MOST_NUMBERS // max(rounding_columns[:, :, 0].size, 1), LEAST_COLUMNS)
         return rounding_columns @ (root if root.shape[1] <= column_limit else drawn_together(root, column_limit))
 
-    def known(self, columns_by_piece: Shown) -> FloatArray:
+    def degrees_along(self, columns_by_piece: Shown) -> FloatArray:
         """Degrees of freedom with which the noise along some directions is known, by how well the memory is. (K,).
 
         columns_by_piece: of each piece (C, rows, K), as it is, of length 1 once white. By how far the variance may be

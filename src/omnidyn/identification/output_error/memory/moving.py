@@ -53,8 +53,8 @@ class Moving:
         half, next_variance = 0.5 * (self.phi**2 + self.share - 1.0), self.settled
         root = math.sqrt(half * half + self.share)
         by_phi, by_log = self.phi * (1.0 + half / root), 0.5 * self.share * (1.0 + (half + 1.0) / root)
-        way = self.phi / next_variance**2
-        return np.array([[1.0, 0.0], [1.0 / next_variance - way * by_phi, -way * by_log]])
+        scale = self.phi / next_variance**2
+        return np.array([[1.0, 0.0], [1.0 / next_variance - scale * by_phi, -scale * by_log]])
 
 
 def while_moving(stretches: Sequence[FloatArray], moves: Sequence[BoolArray]) -> Moving | None:
@@ -73,9 +73,9 @@ def while_moving(stretches: Sequence[FloatArray], moves: Sequence[BoolArray]) ->
     def looked(numbers_here: FloatArray) -> Look:
         share = math.exp(numbers_here[1])
         square, logs, g, by_logs, h, cross_square = _likelihood(series, moving_mask, ends, numbers_here[0], share)
-        size, way = max(square / rows, 1e-300), np.array([1.0, share])
-        gradient = (g / size + by_logs) * way
-        curvature_here = (2.0 * h / size + cross_square - np.outer(by_logs, by_logs) / rows) * np.outer(way, way)
+        size, scale = max(square / rows, 1e-300), np.array([1.0, share])
+        gradient = (g / size + by_logs) * scale
+        curvature_here = (2.0 * h / size + cross_square - np.outer(by_logs, by_logs) / rows) * np.outer(scale, scale)
         return rows * math.log(size) + logs, gradient, curvature_here, size
 
     numbers, curvature, size, cost = scored(looked, STARTS, LOW, HIGH)

@@ -60,7 +60,7 @@ class Parameter:
         return value if self.log else 1.0
 
     @property
-    def known(self) -> tuple[float, float] | None:
+    def inner_prior(self) -> tuple[float, float] | None:
         """The prior in the numbers that the solver sees: (mean, std)."""
         if self.prior is None:
             return None

@@ -26,7 +26,7 @@ class Bend:
     def __init__(self, count: int):
         self._matrix = np.zeros((count, count))
         self._last: tuple[FloatArray, FloatArray] | None = None
-        self.known = False
+        self.has_curvature = False
 
     def learn(self, inner_values: FloatArray, gradient: FloatArray, information: FloatArray) -> None:
         """From the way to the numbers `inner_values` (P,) from where it was last; gradient (P,): downhill there."""
@@ -38,19 +38,19 @@ class Bend:
         curvature, size = float(missing @ step), _size(information)
         if abs(curvature) > CURVATURE_SHARE * float(np.linalg.norm(missing / size) * np.linalg.norm(step * size)):
             self._matrix += np.outer(missing, missing) / curvature
-            self.known = True
+            self.has_curvature = True
 
     def forget(self) -> None:
         """What was learnt led astray: there was a kink on the way."""
         self._matrix[:] = 0.0
-        self.known = False
+        self.has_curvature = False
 
     def beside(self, information: FloatArray, still_parameters: BoolArray) -> FloatArray:
         """What to add to an information (P, P), `still_parameters` ones left out: the whole stays positive, and no step
         wild."""
         addition = np.zeros_like(self._matrix)
         free = np.flatnonzero(~still_parameters)
-        if not self.known or not free.size:
+        if not self.has_curvature or not free.size:
             return addition
         free_block = np.ix_(free, free)
         size = _size(information)[free]

@@ -220,7 +220,7 @@ class Solver(Generic[P]):
                 if not is_better and shift.any():  # what was a guess is dropped before steps get shorter
                     shift = np.zeros(len(held_parameters))
                     continue
-                if not is_better and bend.known:
+                if not is_better and bend.has_curvature:
                     bend.forget()
                     continue
                 share = 1.0 if not is_better else share if is_halved else min(2.0 * share, 1.0)
@@ -299,8 +299,8 @@ class Solver(Generic[P]):
     def _prior(self, point: Point) -> float:
         total = 0.0
         for p, value in zip(self.problem.parameters, point.values, strict=True):
-            if p.known is not None:
-                mean, std = p.known
+            if p.inner_prior is not None:
+                mean, std = p.inner_prior
                 total += 0.5 * ((p.inner(float(value)) - mean) / std) ** 2
         for piece, state in zip(self.problem.pieces, point.states, strict=True):
             pull, start_information = piece.start_prior(state)
@@ -333,8 +333,8 @@ class Normal:
     def _add_priors(self) -> None:
         self.prior_gradient, self.prior_information = np.zeros(self._count), np.zeros(self._count)
         for j, p in enumerate(self.solver.problem.parameters):
-            if p.known is not None:
-                mean, std = p.known
+            if p.inner_prior is not None:
+                mean, std = p.inner_prior
                 self.prior_information[j] = std**-2
                 self.prior_gradient[j] = (mean - self.inner[j]) / std**2
 

@@ -118,19 +118,19 @@ class _Profile:
     ):
         self.solver, self.ways, self.point, self.limit = solver, ways, point, limit
         self.nearest, self.progress = starts_nearest, progress
-        self.known: dict[float | Place, Solution] = {}
+        self.fits: dict[float | Place, Solution] = {}
 
     def at(self, level: float | Place) -> Solution:
         """The fit at a level, made once."""
-        if level not in self.known:
-            self.progress(Report(f"fit {len(self.known) + 1}"))
+        if level not in self.fits:
+            self.progress(Report(f"fit {len(self.fits) + 1}"))
             start = self.point
-            if self.nearest and self.known:
-                start = self.known[min(self.known, key=lambda known_level: _apart(known_level, level))].state.point
-            self.known[level] = min(
-                (self._fit(way, start) for way in self.ways(level)), key=lambda fit: fit.state.objective
+            if self.nearest and self.fits:
+                start = self.fits[min(self.fits, key=lambda known_level: _apart(known_level, level))].state.point
+            self.fits[level] = min(
+                (self._fit(levels, start) for levels in self.ways(level)), key=lambda fit: fit.state.objective
             )
-        return self.known[level]
+        return self.fits[level]
 
     def _fit(self, levels: dict[str, float], start: Point) -> Solution:
         return with_levels(self.solver, levels).minimise(start, self.limit)
@@ -145,12 +145,12 @@ class _Profile:
     def moves(self, values_at_best: FloatArray, steepness: float) -> FloatArray:
         """Distances of the numbers from `values_at_best` at the K levels, by the root of how likely each is. Shape (P,
         K)."""
-        levels = np.array(sorted(level for level in self.known if isinstance(level, float) and level > 0.0))
+        levels = np.array(sorted(level for level in self.fits if isinstance(level, float) and level > 0.0))
         if len(levels) < 2:
             return np.zeros((len(values_at_best), 0))
         cost = np.array([self.cost(level) for level in levels])
         share = np.exp(-(cost - cost.min()) / steepness) * np.gradient(np.log(levels))
-        values = [self.solver.inner(self.known[level].state.point.values) for level in levels]
+        values = [self.solver.inner(self.fits[level].state.point.values) for level in levels]
         return np.sqrt(share / share.sum()) * (np.array(values) - self.solver.inner(values_at_best)).T
 
 
@@ -277,7 +277,7 @@ def _traded(
     profile = _by_the_engine(solution, lambda place: [levels | at(place)], group[0], progress)
     limit = LIMIT * max(_steeper(solution.solver, uncertainty, name) for name in group)
     walk = trade(profile.cost, limit, inside)
-    lowest = min(map(profile.cost, profile.known))
+    lowest = min(map(profile.cost, profile.fits))
     for name in group:
         edge_levels, first_profile = [at(place)[name] for place in walk.edges], profile_by_name[name]
         falls = [place for place in walk.lost_places if at(place)[name] < least_levels[name]]
@@ -326,10 +326,10 @@ def _one_axis(solver: Solver, solution: Solution, levels: dict[str, float], name
     middles = 0.5 * (edges[1:] + edges[:-1])
     best, reach = _search(profile, middles)
     profile.point = profile.at(middles[best]).state.point
-    profile.known.clear()
+    profile.fits.clear()
     best = _descend(profile, middles, best, reach)
     least_cost = min(profile.cost(middles[best]), profile.cost(0.0))
-    low, high = (_walk(profile, middles, best, way, least_cost + limit) for way in (-1, 1))
+    low, high = (_walk(profile, middles, best, side, least_cost + limit) for side in (-1, 1))
     coulomb_level = _coulomb(solver, profile.at(middles[best]).state.point, name)
     is_tied = profile.cost(0.0) <= least_cost + limit
     floor = _coulomb(solver, profile.at(0.0).state.point, name)
@@ -413,11 +413,11 @@ def _descend(profile: _Profile, middles: FloatArray, best: int, reach: int) -> i
     return min(near_indices, key=lambda k: profile.cost(float(middles[k])))
 
 
-def _walk(profile: _Profile, middles: FloatArray, best: int, way: int, limit: float) -> int:
+def _walk(profile: _Profile, middles: FloatArray, best: int, side: int, limit: float) -> int:
     """Index of the last likely plateau from `best` in one direction."""
     last, k, unlikely_count = best, best, 0
-    while 0 <= k + way < len(middles) and unlikely_count < UNLIKELY_PLATEAUS:
-        k += way
+    while 0 <= k + side < len(middles) and unlikely_count < UNLIKELY_PLATEAUS:
+        k += side
         if profile.cost(float(middles[k])) <= limit:
             last, unlikely_count = k, 0
         else:

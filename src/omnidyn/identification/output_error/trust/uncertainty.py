@@ -114,7 +114,7 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     has_ticks = bool(solver.tick.any())
     sums = solver.engine.sums(solution.state.point, final_weighting(solver, solution.state.variance))
     normal = Normal(solver, State(solution.state.point, sums, solution.state.objective, solution.state.variance))
-    relative = _relative(solver, solution)
+    relative = relative_changes(solver, solution)
     seen_numbers, directions, lost = _seen(normal.information, relative, normal.prior_information)
     root = _root_of_inverse(normal.information, lost)
     plain_covariance = root @ root.T
@@ -248,7 +248,7 @@ def _degrees(influence: FloatArray, seen_numbers: BoolArray) -> float:
     return float(np.clip((3.0 * second**2 / fourth).min(), 3.0, len(influence) - 1))
 
 
-def _relative(solver: Solver, solution: Solution) -> FloatArray:
+def relative_changes(solver: Solver, solution: Solution) -> FloatArray:
     """What a relative change of 1 is in the numbers that the solver sees. Shape (P,)."""
     pairs = zip(solver.problem.parameters, solution.state.point.values, strict=True)
     return np.array([1.0 if p.log else abs(float(value)) or 1.0 for p, value in pairs])

@@ -91,7 +91,7 @@ def climb(
             return _ended(base_model, rungs, "slow_errors" if drifts else "only_noise")
         new_rungs, best, next_examinations = _climbed(step, base_model, examinations, lack_by_group, fits, purse)
         rungs += [rung for rung in new_rungs if rung.step or not rungs]
-        rungs += [_untried(step, examination) for examination in purse.told()]
+        rungs += [_untried(step, examination) for examination in purse.untried()]
         if best is None:
             calm_model, new_rungs = (
                 (base_model, [])

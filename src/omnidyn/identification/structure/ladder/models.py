@@ -227,7 +227,7 @@ def tried(
         except OmnidynError as error:
             tried_models.append(Untried(move, cause, Statement("not_fittable", NOTE, numbers={"error": str(error)})))
             continue
-        numbers = base_model.numbers + sum(way.numbers for way in ways)
+        numbers = base_model.numbers + sum(model.numbers for model in ways)
         tried_models.append(Model(fit, solution, begin_by_group, move, cause, numbers, base_model, replaced_step))
     return tried_models
 
@@ -236,9 +236,9 @@ def _begins(base_model: Model, ways: Mapping[str, Switch]) -> dict[str, tuple[Ro
     """Each group as it is switched on, or as it ended."""
     begin_by_group = {}
     for group, start in base_model.begins.items():
-        way = ways.get(group) or as_it_ended(*start, base_model.alone[group])
-        way = way if len(base_model.begins) == 1 else with_levels_as_they_are(way)  # groups profile none
-        begin_by_group[group] = way.robot, way.question
+        model = ways.get(group) or as_it_ended(*start, base_model.alone[group])
+        model = model if len(base_model.begins) == 1 else with_levels_as_they_are(model)  # groups profile none
+        begin_by_group[group] = model.robot, model.question
     return begin_by_group
 
 
@@ -316,8 +316,8 @@ class Purse:
                 self._leave(move, NOT_NEEDED_NOTE)
         return [move for move in moves if move.promise >= least_promise]
 
-    def told(self) -> list[Untried]:
-        """What was not tried since it was told last."""
+    def untried(self) -> list[Untried]:
+        """What was not tried since this was asked last."""
         untried_models, self._untried = self._untried, []
         return untried_models
 

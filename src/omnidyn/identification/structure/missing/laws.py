@@ -76,10 +76,10 @@ def _of_the_body(bench: Workbench) -> Iterator[Candidate]:
 def _off_centre(motion: DrivenMotion) -> FloatArray:
     """What a centre of mass a metre ahead, and one a metre aside, does to the body as it moves. Shape (n, 2, 3)."""
     body, wrenches = motion.robot.body, []
-    for way in np.eye(2) * CENTRE_STEP:
+    for step in np.eye(2) * CENTRE_STEP:
         upper, lower = (
             motion.robot.model_copy(
-                update={"body": body.model_copy(update={"centre": tuple(body.centre + side * way)})}
+                update={"body": body.model_copy(update={"centre": tuple(body.centre + side * step)})}
             )
             for side in (1.0, -1.0)
         )

@@ -48,7 +48,7 @@ class _Refit:
     """A fit with a candidate switched on, and how far it has come."""
 
     candidate: Candidate
-    way: Switch
+    switch: Switch
     solver: Solver[Problem]
     state: State
 
@@ -81,9 +81,9 @@ def refits(
     except OmnidynError:  # a nuisance that the implicit engine does not know
         return {}
     for candidate, remedy in _asked(ranking, candidates):
-        for way in switches(remedy, problem.robot, _question(problem), solution, moves_priors=True):
+        for switch in switches(remedy, problem.robot, _question(problem), solution, moves_priors=True):
             try:
-                begun_fits.append(_begun(candidate, way, problem, solution, errors_by_kind).gone_on(STEPS))
+                begun_fits.append(_begun(candidate, switch, problem, solution, errors_by_kind).gone_on(STEPS))
             except OmnidynError:  # no engine simulates it, or nothing is left to be fitted
                 continue
     begun_fits.sort(key=lambda begun_fit: begun_fit.state.objective)
@@ -143,7 +143,7 @@ def _by_coarse_steps(problem: Problem, parts: Sequence[Parts], point: Point, kin
 
 def _begun(
     candidate: Candidate,
-    way: Switch,
+    switch: Switch,
     problem: Problem,
     solution: Solution,
     errors_by_kind: Mapping[Kind, Sequence[FloatArray]],
@@ -154,15 +154,15 @@ def _begun(
     The exact engine is off by nothing where no rows are left out. Raises OmnidynError where none can.
     """
     records = list({id(piece.record): piece.record for piece in problem.pieces}.values())
-    keys = expand_keys(way.question.free or (), way.robot)
+    keys = expand_keys(switch.question.free or (), switch.robot)
     coarse_kind, is_decimated = (
         next(iter(errors_by_kind)),
         problem.pieces[0].record is not solution.solver.problem.pieces[0].record,
     )
-    exact = not coarse_kind.has_loop and is_exact(way.robot) and stays_exact(way.robot, keys)
+    exact = not coarse_kind.has_loop and is_exact(switch.robot) and stays_exact(switch.robot, keys)
     exact_kind = kind_with(exact=True)
     kind = exact_kind if exact and (not is_decimated or exact_kind in errors_by_kind) else coarse_kind
-    new_problem = make_problem(records, way.robot, replace(way.question, free=keys), kind)
+    new_problem = make_problem(records, switch.robot, replace(switch.question, free=keys), kind)
     prior_by_name = {p.name: p.prior for p in problem.parameters}  # of the robot file, not of where the fit ended
     parameters = tuple(replace(p, prior=prior_by_name.get(p.name, p.prior)) for p in new_problem.parameters)
     new_problem = replace(new_problem, parameters=parameters, pieces=problem.pieces)
@@ -175,7 +175,7 @@ def _begun(
     if new_problem.robot.wheels.traction_mu is not None:  # whose leaps lead the latency of wheels that roll astray
         start_values.append(on_time(new_problem.parameters, values))
     states = [solver.state(Point(start_value, solution.state.point.states)) for start_value in start_values]
-    return _Refit(candidate, way, solver, min(states, key=lambda state: state.objective))
+    return _Refit(candidate, switch, solver, min(states, key=lambda state: state.objective))
 
 
 def _trial(refit: _Refit, problem: Problem, parts: Sequence[Parts], solution: Solution) -> Trial:
@@ -187,9 +187,9 @@ def _trial(refit: _Refit, problem: Problem, parts: Sequence[Parts], solution: So
     changes = {
         name: (values_before[name], value[name]) for name in problem.names[: problem.robot_count] if name in value
     }
-    numbers = max(len(new_problem.parameters) - len(problem.parameters) + refit.way.numbers, 1)
+    numbers = max(len(new_problem.parameters) - len(problem.parameters) + refit.switch.numbers, 1)
     return Trial(
-        columns_by_piece, fitted=FittedCandidate(as_fitted(refit.way.cause, values_before, value), numbers, changes)
+        columns_by_piece, fitted=FittedCandidate(as_fitted(refit.switch.cause, values_before, value), numbers, changes)
     )
 
 

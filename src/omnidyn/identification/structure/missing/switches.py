@@ -85,15 +85,15 @@ def switches(
     start = _where_it_ended(robot, solution, moves_priors)
     settled_question = _as_it_settled(robot, question, solution)
     try:
-        return [_as_far_as_profiled(way, solution) for way in _ways(remedy, start, settled_question)]
+        return [_as_far_as_profiled(switch, solution) for switch in _ways(remedy, start, settled_question)]
     except OmnidynError:  # a size that no robot file may have
         return []
 
 
 def as_it_ended(robot: Robot, question: OutputError, solution: Solution) -> Switch:
     """A fit as it ended, nothing switched on."""
-    way = Switch(_where_it_ended(robot, solution), _as_it_settled(robot, question, solution), STANDS)
-    return _as_far_as_profiled(way, solution)
+    switch = Switch(_where_it_ended(robot, solution), _as_it_settled(robot, question, solution), STANDS)
+    return _as_far_as_profiled(switch, solution)
 
 
 def simpler_first(remedies: Sequence[Remedy]) -> list[Remedy]:
@@ -182,18 +182,18 @@ def _free(question: OutputError, *keys: str) -> OutputError:
     return replace(question, free=tuple(dict.fromkeys((*(question.free or ()), *keys))))
 
 
-def _as_far_as_profiled(way: Switch, solution: Solution) -> Switch:
+def _as_far_as_profiled(switch: Switch, solution: Solution) -> Switch:
     """The same; where no engine looks for levels of breakaway, of a speed loop or wheels that slip, they stay."""
-    if way.robot.wheels.traction_mu is None and not solution.solver.engine.has_loop:
-        return way
-    return with_levels_as_they_are(way)
+    if switch.robot.wheels.traction_mu is None and not solution.solver.engine.has_loop:
+        return switch
+    return with_levels_as_they_are(switch)
 
 
-def with_levels_as_they_are(way: Switch) -> Switch:
+def with_levels_as_they_are(switch: Switch) -> Switch:
     """The same, levels of breakaway that would be profiled held where they stand."""
-    keys = expand_keys(way.question.free or (), way.robot)
-    kept_keys = tuple(key for key in keys if not is_profiled(key, way.robot))
-    return way if kept_keys == keys else replace(way, question=replace(way.question, free=kept_keys))
+    keys = expand_keys(switch.question.free or (), switch.robot)
+    kept_keys = tuple(key for key in keys if not is_profiled(key, switch.robot))
+    return switch if kept_keys == keys else replace(switch, question=replace(switch.question, free=kept_keys))
 
 
 def _of_another_shape(question: OutputError) -> OutputError:

@@ -21,6 +21,7 @@ from omnidyn.logs.readers.ros.mcap_file import McapFile
 from omnidyn.logs.readers.ros.messages import Bag
 from omnidyn.logs.readers.ros.pack import MAX_EXPANSION, MIN_EXPANDED_BYTES, Unpacker, unpack_file
 from omnidyn.logs.table.table import FileTable
+from omnidyn.logs.table.text_file import cut_short
 from omnidyn.progress import Report
 
 SQLITE, ROSBAG, ZSTD = b"SQLite format 3\x00", b"#ROSBAG V", b"\x28\xb5\x2f\xfd"
@@ -63,7 +64,8 @@ def read_files(paths: Sequence[Path], source: str, options: ReadOptions) -> Reco
     tracks, topics, notes = bag.result()
     notes = [*grown, *notes]
     if damage:
-        notes.insert(0, f"the file is damaged: {damage[0]}; {bag.count} messages before that were read")
+        words = f"the file is damaged: {damage[0]}; {bag.count} messages before that were read"
+        notes.insert(0, cut_short(words))
     return Recording(tracks, topics, source, digest.hexdigest(), notes, bag.count if damage else None)
 
 

@@ -1,0 +1,5 @@
+"""Which experiment? A program of moves inside a room, and how well each number will be known after it.
+
+moves (what a robot may be asked to do), recorded (what its sensors will log of it), information (what a log tells of
+each number: the fit's own problem), search (which moves), plan (the door, and the result).
+"""

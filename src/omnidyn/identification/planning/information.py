@@ -1,0 +1,77 @@
+"""What logs tell of the numbers of a robot: the problem of a fit to them, at the robot itself, and the fit's own trust.
+
+No formula stands here: what is predicted is what the fit would say of these logs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.identification.methods import OutputError
+from omnidyn.identification.output_error.engines.engine import Weighting
+from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.solve.solver import Normal, Solution
+from omnidyn.identification.output_error.trust.cures import Blind, blind_directions
+from omnidyn.identification.output_error.trust.uncertainty import WHITE, relative_changes, trust
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+
+
+class Prediction(NamedTuple):
+    """names: of the numbers of the robot file that are free. value, share (P,): each, and its standard error as a share
+    of it. open (P,): whether the logs leave it open, a prior or none. blind: what they do not show, and what would.
+    """
+
+    names: tuple[str, ...]
+    value: FloatArray
+    share: FloatArray
+    open: BoolArray
+    blind: tuple[Blind, ...] = ()
+
+    def of(self, name: str) -> float:
+        """The standard error of a number, as a share of it; infinite where the logs do not tell it."""
+        if name not in self.names or self.open[self.names.index(name)]:
+            return math.inf
+        return float(self.share[self.names.index(name)])
+
+
+def told_by(runs: Sequence[Run], robot: Robot, question: OutputError, cures: bool = False) -> Prediction:
+    """How well a fit to these logs would know the numbers of this robot. cures: look for what would show the rest."""
+    fit = Fit.of(runs, robot, question)
+    solution = _at_robot(fit)
+    problem = solution.solver.problem
+    found, count = trust(solution.solver, solution, WHITE), problem.robot_count
+    share = found.std / relative_changes(solution.solver, solution)
+    values, moving_axes = solution.state.point.values, fit.groups[0].moving_axes
+    blind = blind_directions(problem, values, found.ways, moving_axes) if cures else ()
+    return Prediction(problem.names[:count], values[:count], share[:count], found.open[:count], blind)
+
+
+def information_of(runs: Sequence[Run], robot: Robot, question: OutputError) -> tuple[tuple[str, ...], FloatArray]:
+    """(names, information of each run by itself about relative changes of them, shape (runs, P, P)).
+
+    Of runs that begin at rest, which is known: then it adds up.
+    """
+    fit = Fit.of(runs, robot, question)
+    solution = _at_robot(fit)
+    problem, state = solution.solver.problem, solution.state
+    relative, count = relative_changes(solution.solver, solution), len(problem.parameters)
+    places = {id(record): k for k, record in enumerate(fit.groups[0].records)}
+    information = np.zeros((len(runs), count, count))
+    sums = solution.solver.engine.sums(state.point, Weighting(state.variance))
+    for piece, piece_sums in zip(problem.pieces, sums, strict=True):
+        shares = piece_sums.info[:, :count, :count] / state.variance[piece_sums.columns, None, None]
+        information[places[id(piece.record)]] += shares.sum(axis=0)
+    return problem.names, information * np.outer(relative, relative)
+
+
+def _at_robot(fit: Fit) -> Solution:
+    """The robot as it was given, as if it were the best point."""
+    solver = fit.solver()
+    state = solver.state(solver.problem.start())
+    return Solution(state, Normal(solver, state).held, 0, True, solver)

@@ -1,0 +1,66 @@
+"""Moves: what a robot is asked to do for a moment, from rest to rest, and then the mirror image of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.model.deadzone import axis_patterns
+from omnidyn.model.robot import Robot
+
+FORWARD, SIDEWAYS, TURN = "forward", "sideways", "turn"
+DIRECTIONS: dict[str, tuple[float, float, float]] = {  # share of the pattern of each axis
+    FORWARD: (1.0, 0.0, 0.0),
+    SIDEWAYS: (0.0, 1.0, 0.0),
+    "forward and left": (0.5, 0.5, 0.0),
+    "forward and right": (0.5, -0.5, 0.0),
+    TURN: (0.0, 0.0, 1.0),
+}
+RAMP, STAIRS, STEP, REVERSAL = "ramp", "stairs", "step", "reversal"
+SHAPES: dict[str, Callable[[FloatArray], FloatArray]] = {  # of the time from 0 to 1
+    RAMP: lambda t: 1.0 - np.abs(2.0 * t - 1.0),
+    STAIRS: lambda t: np.minimum(np.floor(4.0 * t) + 1.0, 4.0) / 4.0,
+    STEP: lambda t: np.ones_like(t),
+    REVERSAL: lambda t: np.where(t < 0.5, 1.0, -1.0),
+}
+LEVELS = (0.15, 0.25, 0.4, 0.6, 0.8, 1.0)  # of the largest input
+SECONDS = (0.6, 1.2, 2.4)
+
+
+@dataclass(frozen=True)
+class PlannedMove:
+    """direction, shape: of DIRECTIONS and SHAPES. level: share of the largest input. seconds, rest [s]: how long the
+    input lasts, and how long it is 0 then, until the robot stands. The mirror image of both follows."""
+
+    direction: str
+    shape: str
+    level: float
+    seconds: float
+    rest: float = 0.0
+
+    @property
+    def duration(self) -> float:
+        """With its mirror image [s]."""
+        return 2.0 * (self.seconds + self.rest)
+
+    def input(self, robot: Robot, dt: float) -> FloatArray:
+        """Share of the largest input, rows of dt [s], shape (rows, wheels): the move and its rest, no mirror image."""
+        rows = max(round(self.seconds / dt), 1)
+        shape = SHAPES[self.shape]((np.arange(rows) + 0.5) / rows)
+        pattern = np.array(DIRECTIONS[self.direction]) @ axis_patterns(robot)
+        driven = self.level * shape[:, None] * (pattern / np.abs(pattern).max())
+        return np.concatenate([driven, np.zeros((round(self.rest / dt), driven.shape[1]))])
+
+    def both(self, robot: Robot, dt: float) -> FloatArray:
+        """The same with the mirror image."""
+        once = self.input(robot, dt)
+        return np.concatenate([once, -once])
+
+
+def all_moves() -> list[PlannedMove]:
+    """Every move that a plan may choose from."""
+    return [PlannedMove(*choice) for choice in product(DIRECTIONS, SHAPES, LEVELS, SECONDS)]

@@ -1,0 +1,171 @@
+"""A plan: inside its room for robots that it has not seen, from rest to rest, and as good as it says."""
+
+import json
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.identification.methods import OutputError
+from omnidyn.model.keys import BOX, Key
+from tests.support.pages import command
+
+AXEBOT, MECANUM = omnidyn.load_robot("axebot"), omnidyn.load_robot("mecanum")
+NOISE = {"twist": (0.02, 0.02, 0.1)}
+ROOM = (3.0, 3.0)
+RATIOS = ("motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad", "motor.resistance_ohm", "body.mass_kg")
+
+
+@pytest.fixture(scope="module", params=[AXEBOT, MECANUM], ids=lambda robot: robot.name)
+def made(request):
+    return omnidyn.plan(request.param, ROOM, noise=NOISE, free=("friction",))
+
+
+def driven(robot, commands):
+    return omnidyn.simulate(robot, commands.voltage, dt=float(commands.t[1]))
+
+
+def off(robot, rng):
+    """A robot with friction and resistance up to 30 % off."""
+    for key in (*BOX, "motor.resistance_ohm"):
+        robot = Key.parse(key).set(robot, rng.uniform(0.7, 1.3) * Key.parse(key).get(robot))
+    return robot
+
+
+def test_at_most_2_of_100_robots_leave_the_room(made):
+    rng = np.random.default_rng(17)
+    left = 0
+    for _ in range(50):
+        robot = off(made.robot, rng)
+        places = [np.abs(driven(robot, made.commands(held_out)).pose[:, :2]) for held_out in (False, True)]
+        left += max(place.max() for place in places) > 0.5 * ROOM[0]
+    assert left <= 1
+
+
+def test_each_move_begins_and_ends_at_rest(made):
+    run = driven(made.robot, made.commands())
+    for start, _ in made.moves:
+        row = round(start / made.dt)
+        assert not made.commands().voltage[row - 1].any()
+        assert np.abs(run.twist[row]).max() < 0.011
+    assert np.abs(run.pose[-1, :2]).max() < 0.05  # each move is followed by its mirror image
+
+
+def test_the_fit_of_its_log_is_as_sure_as_it_was_told(made):
+    """Of robots 30 % off: what identify says of each number beside its truth, and beside the prediction."""
+    rng = np.random.default_rng(3)
+    z, halves = [], []
+    for _ in range(10):
+        robot = off(made.robot, rng)
+        run = driven(robot, made.commands())
+        log = omnidyn.Run(
+            t=run.t, voltage=run.voltage, twist=run.twist + rng.normal(size=run.twist.shape) * NOISE["twist"]
+        )
+        question = OutputError(free=BOX, nuisances=())
+        start = made.robot.replace(motor=robot.motor)  # its resistance is known
+        fit = omnidyn.identify(log, start, question)
+        for name in BOX:
+            z.append((fit.value[name] - Key.parse(name).get(robot)) / fit.std[name])
+            halves.append(2.0 * fit.std[name] / fit.value[name] / made.predicted[name].half)
+    assert 0.8 < np.std(z) < 1.25
+    assert 0.75 < np.median(halves) < 1.3
+    assert all(known.is_learnt for known in made.predicted.values())
+
+
+def test_it_tells_more_than_ramps_and_steps_do():
+    """The geometric mean of the standard errors, from the fit's own intervals, in the same time."""
+    made = omnidyn.plan(AXEBOT, ROOM, noise=NOISE, free=("friction",))
+    patterns = omnidyn.axis_patterns(AXEBOT)
+    up = np.concatenate([np.linspace(0.0, 1.0, 250), np.zeros(50)])
+    step = np.concatenate([np.ones(120), np.zeros(130)])
+    shapes = [sign * level * shape for shape, level in ((up, 3.0), (step, 4.0)) for sign in (1.0, -1.0)]
+    rows = np.concatenate([np.outer(shape, pattern) for pattern in patterns for shape in shapes])
+    sure = []
+    for voltage in (np.concatenate([rows, rows])[: round(60.0 / 0.01)], made.commands().voltage):
+        run = omnidyn.simulate(AXEBOT, voltage, 0.01)
+        noisy = run.twist + np.random.default_rng(0).normal(size=run.twist.shape) * NOISE["twist"]
+        log = omnidyn.Run(t=run.t, voltage=run.voltage, twist=noisy)
+        fit = omnidyn.identify(log, AXEBOT, OutputError(free=BOX, nuisances=()))
+        sure.append(np.mean([np.log(fit.std[name] / fit.value[name]) for name in BOX]))
+    print(f"geometric means of std: ramps and steps {np.exp(sure[0]):.4f}, plan {np.exp(sure[1]):.4f}")
+    assert np.exp(sure[0] - sure[1]) > 1.2
+
+
+def test_one_number_is_learnt_better_where_it_is_asked_for():
+    name = BOX[2]
+    plain, aimed = (omnidyn.plan(AXEBOT, ROOM, 30.0, noise=NOISE, free=("friction",), aim=aim) for aim in ("", name))
+    assert aimed.predicted[name].half < 0.9 * plain.predicted[name].half
+
+
+def test_what_no_log_of_these_channels_tells_is_said_with_what_would():
+    """To speeds, volts and ohms and torques come as ratios only."""
+    made = omnidyn.plan(AXEBOT, ROOM, 30.0, noise=NOISE, free=("friction", *RATIOS))
+    assert len(made.learnt) < len(made.predicted)
+    assert made.blind
+    assert "log currents" in str(made)
+
+
+def test_duties_are_planned_as_duties():
+    duty = AXEBOT.replace(drive=AXEBOT.drive.replace(kind="duty", supply=6.0))
+    made = omnidyn.plan(duty, ROOM, 30.0, noise=NOISE, free=("friction",))
+    commands = made.commands()
+    assert commands.voltage is None
+    assert 0.1 < np.abs(commands.duty).max() <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"area": (3.0,)}, "not the size of a room"),
+        ({"area": (3.0, -1.0)}, "not the size of a room"),
+        ({"seconds": 1.0}, "strange seconds"),
+        ({"rate": 1e6}, "strange rate"),
+        ({"noise": {"sonar": 0.1}}, "no such channel"),
+        ({"noise": {"twist": (0.1, 0.2)}}, "no noise of twist"),
+        ({"noise": {"twist": 0.0}}, "no noise of twist"),
+        ({"noise": {}}, "nothing is recorded"),
+        ({"aim": "body.mass_kg"}, "not a number that is free"),
+    ],
+)
+def test_what_cannot_be_planned_is_refused(wrong, words):
+    arguments = {"area": ROOM, "seconds": 20.0, "noise": NOISE} | wrong
+    with pytest.raises(omnidyn.OmnidynError, match=words):
+        omnidyn.plan(AXEBOT, arguments.pop("area"), arguments.pop("seconds"), **arguments)
+
+
+def test_a_robot_that_does_not_stop_has_no_plan():
+    heavy = Key.parse("body.mass_kg").set(AXEBOT, 1000.0)
+    heavy = Key.parse("body.inertia_kg_m2").set(heavy, 100.0)
+    with pytest.raises(omnidyn.OmnidynError, match="no plan moves the robot visibly"):
+        omnidyn.plan(heavy, ROOM, 20.0, noise=NOISE)
+
+
+def test_a_firmware_that_holds_speeds_is_refused_with_a_reason():
+    with pytest.raises(omnidyn.OmnidynError, match="holds the speeds"):
+        omnidyn.plan(omnidyn.load_robot("lekiwi"))
+
+
+def test_the_command_writes_two_programs_that_simulate_reads(tmp_path):
+    out = tmp_path / "plan.csv"
+    words = ("plan", "axebot", "--time", "20", "--noise", "twist=0.02,0.02,0.1")
+    told, code, _ = command(*words, "-o", out, "--picture", tmp_path / "plan.svg", "--json")
+    assert code == 0
+    assert told["unit"] == "V"
+    assert set(told["predicted"]) == set(BOX)
+    for path in (out, tmp_path / "plan-check.csv"):
+        rows = omnidyn.read_commands(path, 3)
+        assert command("simulate", "axebot", path, "-o", tmp_path / f"run-{path.name}")[1] == 0
+        assert len(rows.rows) > 100
+    again = command(*words, "-o", out)
+    assert again[1] == 3
+    assert "exists" in again[2]
+    assert json.dumps(told)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"), [(("--area", "big"), "such as 3x3"), (("--noise", "twist"), "such as twist=0.02")]
+)
+def test_options_that_say_nothing_are_refused(words, said):
+    _, code, err = command("plan", "axebot", *words)
+    assert code == 3
+    assert said in err
