@@ -132,7 +132,7 @@ def test_robots_are_seen_edited_renamed_and_removed_and_a_map_is_none(browser, t
     page.get_by_text("was not taken").wait_for()
     assert "400" in browser.complaints.pop()  # what the browser says of the refusal
     assert states(page)["Robot"] == ("✓", "axebot")
-    load_again_here(page)
+    load_again(page)
     drop(page, heavy)
     page.wait_for_function("document.querySelector('.q-tabs').innerText.includes('heavy.toml')")
     page.get_by_label("View or edit heavy.toml").click()
@@ -152,9 +152,3 @@ def test_robots_are_seen_edited_renamed_and_removed_and_a_map_is_none(browser, t
     page.get_by_label("Remove heavier.toml").click()
     page.wait_for_function("!document.querySelector('.panels').innerText.includes('heavier.toml')")
     assert states(page)["Robot"] == ("○", "none chosen")
-
-
-def load_again_here(page):
-    """Load the tab anew: its address says which."""
-    page.reload()
-    page.get_by_text("Robots of this session").wait_for()

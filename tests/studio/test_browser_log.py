@@ -162,6 +162,7 @@ def test_nothing_moves_under_the_mouse_while_it_is_drawn_or_opened(browser, tmp_
     waiting = []
     page.route("**/series/*", lambda route: waiting.append(route))  # signals come late
     load_again(page)
+    page.wait_for_selector("omni-plot canvas")
     heights = """name => new Promise(done => { const seen = new Set(), element = document.querySelector(name);
         new ResizeObserver(() => seen.add(element.clientHeight)).observe(element);
         setTimeout(() => done([...seen].filter(height => height)), 600); })"""

@@ -65,7 +65,7 @@ def as_flags(text):
 def load_again(page):
     """Load the page anew, as a user who waits until something is there."""
     page.reload()
-    page.wait_for_selector("#example")
+    page.wait_for_selector(".panels .q-tab-panel")
 
 
 def pick(page, option):
