@@ -5,7 +5,7 @@ import signal
 import subprocess
 
 import omnidyn
-from tests.support.pages import choose_axebot, command, drop, laid_out, numbers, shown, tab, verdict
+from tests.support.pages import choose_axebot, command, drop, laid_out, load_again, numbers, shown, tab, verdict
 from tests.support.pages import write_log as written
 
 

@@ -35,7 +35,6 @@ def test_a_process_that_ends_is_an_error_and_the_next_job_gets_another(tmp_path)
         answer = await worker.run("check", request, lambda kind, value: None)
         assert answer["rows"] == 201
         kill(worker)  # while it waits: nothing is lost
-        await worker._process.wait()
         assert (await worker.run("free_keys", {"robot": "axebot"}, lambda kind, value: None))["default"]
         starting = asyncio.create_task(worker.ask("free_keys", {"robot": "axebot"}))
         await finished(lambda: worker.busy)

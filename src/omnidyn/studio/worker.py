@@ -55,7 +55,18 @@ class Worker:
         async with self._lock:
             self.busy, self._is_cancelled = True, False
             try:
-                return await self._result(await self._started(), job, request, listen)
+                before, heard = self._process, [False]
+
+                def hear(kind: str, value: Any) -> None:
+                    heard[0] = True
+                    listen(kind, value)
+
+                try:
+                    return await self._result(await self._started(), job, request, hear)
+                except EndedError:
+                    if self._process is not before or heard[0]:
+                        raise
+                return await self._result(await self._started(), job, request, listen)  # it had ended while it waited
             finally:
                 self.busy = False
 
