@@ -1,6 +1,7 @@
 """A process that ends is said, and the next job runs: asked of the server's side, without pages."""
 
 import asyncio
+import contextlib
 import os
 import signal
 
@@ -16,7 +17,8 @@ from tests.support.pages import write_log
 
 def kill(worker):
     """End the process of a worker, as a system without memory does."""
-    os.kill(worker._process.pid, signal.SIGKILL)
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(worker._process.pid, signal.SIGKILL)
 
 
 async def finished(condition):

@@ -47,8 +47,8 @@ def tab(page, name):
 
 def verdict(page, name="#verdict"):
     """The verdict on top, as `laid_out` writes it, without the mark before it."""
-    page.wait_for_selector(name)
-    return "\n".join(page.locator(f"{name} .text").all_inner_texts())
+    texts = "name => (all => all.length && all.map(e => e.innerText))([...document.querySelectorAll(`${name} .text`)])"
+    return "\n".join(page.wait_for_function(texts, arg=name).json_value())
 
 
 def laid_out(words):

@@ -140,7 +140,7 @@ def _keep_address(page: Page) -> None:
             f"{{ u.searchParams.set('{TAB}', '{tab}'); history.pushState(null, '', u); }}"
         )
 
-    page.tabs.on_value_change(lambda event: push(event.value))
+    page.tabs.on_value_change(lambda event: push(str(event.value)))
     ui.add_body_html(f"<script>{WATCH}</script>")
     ui.on(TAB, lambda event: page.go(str(event.args).capitalize() or "Log"))
 
