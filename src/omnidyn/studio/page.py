@@ -94,14 +94,17 @@ class Page:
         for part in parts:
             self.parts.setdefault(part, []).append(shown.refresh)
 
-    def mirror(self, choice: Any, part: str, get: Callable[[], Any]) -> None:
-        """Let a choice show what another page chose when a part changes; it is not made again: it may be open."""
+    def mirror(self, choice: Any, part: str, get: Callable[[], Any], name: str = "") -> None:
+        """Let a choice show what another page chose when a part changes; it is not made again: it may be open.
+
+        name: of the choice on this page; its label by default.
+        """
 
         def follow() -> None:
             if not choice.is_deleted and choice.value != get():
                 choice.set_value(get())
 
-        self.mirrors.setdefault(part, {})[choice.props["label"]] = follow
+        self.mirrors.setdefault(part, {})[name or choice.props["label"]] = follow
 
     def box(self, title: str, is_open: bool = False) -> ui.expansion:
         """A part that can be folded; it stays as it was when it is made again."""

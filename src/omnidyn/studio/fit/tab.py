@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from nicegui import ui
@@ -32,7 +33,7 @@ class FitTab:
         """Lay it out."""
         self.page.empty("Fit")
         self.page.part(self.page.robot_choice, ROBOT)
-        self.page.part(self._uses, LOGS, FIT)
+        self.page.part(self._uses, LOGS)
         self.page.part(self._free, FREE, ROBOT)
         self.page.part(self._start, FIT, LOGS)
         self.page.progress(FIT, lambda: self.fitting.last, "fit")
@@ -46,9 +47,11 @@ class FitTab:
             for key, log in self.session.logs.items():
                 with ui.row().classes("line entry"):
                     ui.label(log.label).classes("use")
-                    ui.toggle(
+                    use = ui.toggle(
                         [FITTED, HELD_OUT, LEFT_OUT], value=self.fitting.use_of(key), on_change=self._use(key)
-                    ).props(f"no-caps dense unelevated aria-label='use of {log.label}'")
+                    )
+                    use.props(f"no-caps dense unelevated aria-label='use of {log.label}'")
+                    self.page.mirror(use, FIT, partial(self.fitting.use_of, key), key)
                     if log.error or (log.result and log.result["has_errors"]):
                         ui.label("not usable as it is: leave it out, or mend it on the tab Log").classes("error-text")
         ui.label("What is held out is predicted, not fitted: that shows what the model is worth.").classes("quiet")
