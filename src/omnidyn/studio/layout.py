@@ -22,7 +22,7 @@ from omnidyn.studio.page import Page
 from omnidyn.studio.parts import FIT, LOGS, PROGRESS, ROBOT
 from omnidyn.studio.robot.tab import RobotTab
 from omnidyn.studio.session import Session
-from omnidyn.studio.steps import MARKS, following, steps
+from omnidyn.studio.steps import MARKS, StepState, following, steps
 from omnidyn.studio.track.state import Tracks
 from omnidyn.studio.track.tab import TrackTab
 
@@ -64,6 +64,10 @@ class Studio:
         await asyncio.to_thread(workspace.write, space, path)
         return path
 
+    def line(self) -> list[StepState]:
+        """Where each step stands."""
+        return steps(self.session, self.fitting.last, self.fitting.why_not()[0])
+
     def tabs(self, page: Page) -> dict[str, Any]:
         """The tabs of a page, by name."""
         return {
@@ -83,7 +87,7 @@ def show(studio: Studio, tab: str = "") -> None:
     # What moves between press and release of the mouse loses the click: a list is there at once, with all its rows
     ui.select.default_props("transition-duration=0 virtual-scroll-slice-size=200")
     session, client = studio.session, ui.context.client
-    page = Page(session, studio.fitting)
+    page = Page(session, studio.line)
     tabs = studio.tabs(page)
     session.listeners.add(page.changed)
     client.on_delete(lambda: _forget(session, page))
@@ -98,7 +102,7 @@ def show(studio: Studio, tab: str = "") -> None:
 
     def line() -> None:
         """Where each step stands, on its tab, and what to do next."""
-        all_steps = steps(session, studio.fitting)
+        all_steps = studio.line()
         for step in all_steps:
             mark, words = marks[step.name]
             mark.set_text(MARKS[step.state])

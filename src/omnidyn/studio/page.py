@@ -9,10 +9,9 @@ from typing import Any
 from nicegui import ui
 
 from omnidyn.studio.elements import verdict
-from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.parts import FIT, LOGS, ROBOT
 from omnidyn.studio.session import Session
-from omnidyn.studio.steps import DONE, steps
+from omnidyn.studio.steps import DONE, StepState
 from omnidyn.studio.task import Task, progress_of
 
 STEPS = (  # what a newcomer does: title, and words
@@ -25,8 +24,8 @@ STEPS = (  # what a newcomer does: title, and words
 class Page:
     """One browser tab. parts: what is made again when a part of the session changes."""
 
-    def __init__(self, session: Session, fitting: Fitting) -> None:
-        self.session, self.fitting, self.client = session, fitting, ui.context.client
+    def __init__(self, session: Session, line: Callable[[], list[StepState]]) -> None:
+        self.session, self.line, self.client = session, line, ui.context.client
         # part -> label of a choice -> what lets it follow another page
         self.mirrors: dict[str, dict[str, Callable[[], None]]] = {}
         self.stale = set[str]()  # parts that changed while nobody was connected
@@ -58,7 +57,7 @@ class Page:
         """What comes after this tab, as its one primary button; on a tab that is not done, what is missing."""
 
         def show() -> None:
-            line = steps(self.session, self.fitting)
+            line = self.line()
             places = {step.name: k for k, step in enumerate(line)}
             if line[places[name]].state != DONE:
                 return
@@ -74,7 +73,7 @@ class Page:
         """The three steps, and a picture, where this tab has nothing to show yet."""
 
         def show() -> None:
-            line = steps(self.session, self.fitting)
+            line = self.line()
             if all(step.state == DONE for step in line[: 1 if name == "Log" else 2]):
                 return
             with ui.element("div").classes("empty"):
