@@ -7,10 +7,14 @@ import pytest
 
 import omnidyn
 from omnidyn.control import tune as tuning
+from omnidyn.control.circumstances import Circumstances
 from omnidyn.control.controllers import ControllerFile, load_controller, save_controller
+from omnidyn.control.instruments import Instruments
+from omnidyn.control.margins import loop_margins
 from omnidyn.control.mpc.settings import POSE, Settings
 from omnidyn.control.pushes import push_force, pushes
 from omnidyn.errors import InputError
+from omnidyn.model.log_effects import Sensors
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
 
@@ -144,3 +148,29 @@ def test_it_begins_where_a_file_says(tmp_path):
 def test_what_cannot_be_tuned_is_refused(options, words):
     with pytest.raises(InputError, match=words):
         omnidyn.tune(AXEBOT, **{"path": "eight", **options})
+
+
+def test_settings_without_a_delay_margin_are_left(tmp_path):
+    """An observer that takes all at once: 5 ms that nobody knows of, and the loop swings. Nothing found is so."""
+    bold = tmp_path / "bold.toml"
+    bold.write_text(
+        'schema = 1\ncontroller = "mpc"\n[options]\npush_walk = [8.0, 8.0, 25.0]\nvolts = 1e-5\n'
+        "pose = [3e4, 3e4, 3e3]\n",
+        "utf-8",
+    )
+    robot = AXEBOT.replace(sensors=Sensors(twist="mean", encoder_counts=4096))
+    control = load_controller(bold).make(robot)
+    around = Circumstances(sensors=Instruments(robot.sensor_model, odometry=True))
+    assert loop_margins(robot, control, around).delay < tuning.LEAST_DELAY
+    found = omnidyn.tune(robot, ["eight", SLOW], str(bold), draws=2, evaluations=8, duration=2.0)
+    assert found.margins.delay >= tuning.LEAST_DELAY
+    assert "before the loop no longer settles" in " ".join(str(found).split())
+
+
+def test_robots_of_the_search_are_late_early_and_measured_worse():
+    kit = Instruments(Sensors(twist="mean", encoder_counts=2048, pose_rate_Hz=30.0, pose_noise_m=1e-3))
+    late, early, same = tuning._variants([AXEBOT.replace(drive=AXEBOT.drive.replace(latency=0.02))] * 3, kit)
+    assert [round(variant.plant.drive.latency, 6) for variant in (late, early, same)] == [0.03, 0.01, 0.02]
+    assert late.kit == same.kit == kit
+    worse = early.kit.sensors
+    assert (worse.encoder_counts, worse.pose_rate, worse.pose_noise) == (1024, 15.0, 2e-3)

@@ -67,7 +67,8 @@ def track(
     _check_outputs(out, report, gif, force)
     files = [name for name in (path, *controller) if name.endswith((".toml", ".csv", ".parquet", ".pq"))]
     keep_inputs([], [robot, plant], files, out, report, gif)
-    from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
+    from omnidyn.control.circumstances import Circumstances
+    from omnidyn.control.closed_loop import told_of_loop, tracked_with_margins
     from omnidyn.control.controllers import several
     from omnidyn.control.instruments import instruments
     from omnidyn.control.readings import with_sensors
@@ -83,7 +84,7 @@ def track(
     trackings: list[Tracking] = []
     with shown_progress("tracking") as progress:
         for follower in several(controller, believed, no_friction, no_observer, **options):
-            trackings.append(tracked(driven, follow, follower, around, progress))
+            trackings.append(tracked_with_margins(driven, follow, follower, around, progress))
     document = trackings_document(trackings, notes := [demand.verdict, *demand.statements()])
     record = _record(robot, plant, files)
     _write(trackings, out, force)

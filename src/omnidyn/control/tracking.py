@@ -11,6 +11,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import PATH_ENDED
+from omnidyn.control.margins import MOST_DELAY, MOST_GAIN, Margins
 from omnidyn.document import Document, Part, Points, Table, plain
 from omnidyn.run import Run
 from omnidyn.shown import FIGURE, Displayable, make
@@ -29,7 +30,8 @@ class Tracking(Displayable):
     controller, plant, path: their names. run: what the robot did. wanted: poses of the path at the times of the run,
     shape (samples, 3). skip [s]: errors before it count for nothing. dt [s]: between two steps.
     saturated_share: of the steps, those with an output at its limit. step_times [s]: of the controller, shape (steps,).
-    statuses: word of `info.status` other than "ok" -> number of steps. sensors: with which the robot was measured.
+    margins: by how much outputs may be later and stronger. statuses: word of `info.status` other
+    than "ok" -> number of steps. sensors: with which the robot was measured.
     others: of the other controllers; numbers are those of this one, `best` is the nearest of all, and summary, document
     and plot are of all of them, side by side.
     """
@@ -45,6 +47,7 @@ class Tracking(Displayable):
     step_times: FloatArray
     statuses: Mapping[str, int] = field(default_factory=dict)
     sensors: str = ""
+    margins: Margins | None = None
     others: tuple[Tracking, ...] = ()
 
     def __repr__(self) -> str:
@@ -154,6 +157,8 @@ class Tracking(Displayable):
             "step_us": self.step_us,
             "effort_V": self.effort,
             "restlessness_V": self.restlessness,
+            "delay_margin_s": None if self.margins is None else self.margins.delay,
+            "gain_margin": None if self.margins is None else self.margins.gain,
             "statuses": dict(self.statuses),
         }
 
@@ -184,6 +189,7 @@ def trackings_document(trackings: Sequence[Tracking], notes: Sequence[Statement]
             f"{100.0 * tracking.saturated_share:.1f}",
             f"{tracking.effort:.2f}",
             f"{tracking.restlessness:.3f}",
+            *_margins(tracking),
             f"{tracking.step_us['median']:.0f}",
             f"{tracking.step_us['p99']:.0f}",
         )
@@ -197,6 +203,8 @@ def trackings_document(trackings: Sequence[Tracking], notes: Sequence[Statement]
         "at limit %",
         "effort V",
         "change V",
+        "delay ms",
+        "gain",
         "step us",
         "p99 us",
     )
@@ -210,6 +218,7 @@ def trackings_document(trackings: Sequence[Tracking], notes: Sequence[Statement]
         Table(columns, rows, "<>", name="controllers"),
         "",
         "position, heading: rmse; effort: rms of a voltage; change: its mean change from step to step.",
+        "delay, gain: how much later outputs may act, and how many times as strong, before the loop no longer settles.",
     ]
     parts += [Points(notes, "-", "path")] if notes else []
     parts.append(by_severity(warnings, "warnings"))
@@ -226,6 +235,17 @@ def trackings_document(trackings: Sequence[Tracking], notes: Sequence[Statement]
         "warnings": plain(warnings),
     }
     return Document(parts, data, warnings, verdict=verdict)
+
+
+def _margins(tracking: Tracking) -> tuple[str, str]:
+    """The margins in cells of a table."""
+    if tracking.margins is None:
+        return "", ""
+    delay, gain = tracking.margins.delay, tracking.margins.gain
+    return (
+        f"{'> ' * (delay >= MOST_DELAY)}{1e3 * delay:.0f}",
+        f"{'> ' * (gain >= MOST_GAIN)}{gain:.2g}",
+    )
 
 
 def _verdict(trackings: Sequence[Tracking]) -> Statement:

@@ -7,6 +7,10 @@ So a setting is judged by how many times less both are off. The robots are draws
 the robot file; each is measured with its own sensors, with the same noise and the same pushes for every g, so that J
 has no noise of its own. One setting after the other is made larger or smaller by a factor as long as J falls, then by a
 smaller one; what is found is judged on other draws, noise, pushes and paths.
+
+One robot in three has outputs that act LATENCY later, one LATENCY earlier and sensors a step worse. Settings of a loop
+that does not settle where its outputs act LEAST_DELAY later are not taken; from such a start the search goes back to
+the settings that the controller has by itself.
 """
 
 from __future__ import annotations
@@ -14,15 +18,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.control.closed_loop import Circumstances, circumstances, told_of_loop, tracked
+from omnidyn.control.circumstances import Circumstances, TuneOptions, circumstances
+from omnidyn.control.closed_loop import told_of_loop, tracked
 from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
 from omnidyn.control.demand import path_demand
-from omnidyn.control.instruments import instruments
+from omnidyn.control.instruments import Instruments, instruments
+from omnidyn.control.margins import Margins, has_delay_margin, loop_margins
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import is_several
@@ -40,7 +46,6 @@ from omnidyn.progress import Progress, Report, silent
 from omnidyn.shown import Displayable
 from omnidyn.statement import NOTE, Statement, as_verdict
 
-LOOP = ("dt", "duration", "noise", "delay", "rng", "sensors")  # options of the loop
 DRAWS, EVALUATIONS, NOISE = 3, 30, 0.005
 MOST_DRAWS, MOST_EVALUATIONS = 1000, 10_000
 FACTORS, FARTHEST = (4.0, 2.0), 16.0  # by which a setting is changed, round by round; and from the start at the most
@@ -90,7 +95,8 @@ class Tuned(Displayable):
     before, after: of these and of those chosen, over robots, noise, pushes and paths that the search has not seen;
     tried: of the best of the search there. own_before, own_after: on the robot of the file itself.
     draws: robots the search drove; uncertain: whether the file says how far its numbers may be off: else they are near
-    it. evaluations: gains that were tried. noise [m/s], delay [steps], dt [s], sensors: of the loops.
+    it. margins: of the loop with the gains chosen. evaluations: gains that were tried. noise [m/s], delay
+    [steps], dt [s], sensors: of the loops.
     """
 
     robot: str
@@ -110,6 +116,7 @@ class Tuned(Displayable):
     delay: int
     dt: float
     sensors: str
+    margins: Margins
 
     def __repr__(self) -> str:
         return f"<Tuned {self.controller.controller} for {self.robot}: {dict(self.gains)}>"
@@ -147,6 +154,7 @@ class Tuned(Displayable):
         }
         statements = [
             Statement("optimised", NOTE, numbers=numbers),
+            Statement("tuned_margins", NOTE, numbers={"delay": self.margins.delay, "gain": self.margins.gain}),
             Statement("judged_elsewhere", NOTE, numbers={"paths": self.judged_on}),
         ]
         errors = {
@@ -198,6 +206,8 @@ class Tuned(Displayable):
                 "sensors": self.sensors,
                 "evaluations": self.evaluations,
                 "better": self.better,
+                "delay_margin_s": self.margins.delay,
+                "gain_margin": self.margins.gain,
                 "statements": self.statements(),
                 **as_verdict(self.verdict),
             }
@@ -212,7 +222,7 @@ def tune(
     draws: int = DRAWS,
     evaluations: int = EVALUATIONS,
     progress: Progress = silent,
-    **options: Any,
+    **options: Unpack[TuneOptions],
 ) -> Tuned:
     """Find the settings of a controller by simulation, over the robots that the file says may be meant.
 
@@ -242,7 +252,7 @@ def tune(
     check_order("tune(robot, path, controller)", (robot, Robot), (paths, kinds), (controller, str))
     _check_counts(draws, evaluations, path is None or paths)
     seconds = options.get("duration", SECONDS if path is None else None)
-    around = circumstances(robot, LOOP, **{"noise": NOISE, **options, "duration": seconds})
+    around = circumstances(robot, (*TuneOptions.__annotations__,), **{"noise": NOISE, **options, "duration": seconds})
     around = replace(around, skip=min(SKIP, 0.5 * (seconds or SECONDS)))
     kit, seed = around.sensors or instruments(None, robot), around.seed
     robot = with_sensors(robot, options.get("sensors"))
@@ -251,7 +261,9 @@ def tune(
     follow, judged = [[path_named(item) for item in paths]] * 2 if paths else _paths(robot)
     uncertain = bool(known_errors(robot).keys)
     training, held_out = (
-        plausible(robot, draws, k) if uncertain else _near(robot, draws, k, 0.0 if kit.odometry else RADIUS)
+        _variants(
+            plausible(robot, draws, k) if uncertain else _near(robot, draws, k, 0.0 if kit.odometry else RADIUS), kit
+        )
         for k in (seed, seed + 1)
     )
     count, rest = 0, math.inf
@@ -262,15 +274,22 @@ def tune(
         progress(Report(f"trying {', '.join(f'{name} {_text(value)}' for name, value in gains.items())}"))
         score = _score(robot, training, follow, _with(spec, gains), around)
         rest = min(rest, MOST_RESTLESS * score.restless) if count == 1 else rest
-        return score.cost * max(1.0, score.restless / rest)
+        return score.cost * max(1.0, score.restless / rest) * (1.0 if is_steady(_with(spec, gains)) else UNSTEADY)
 
-    best = _search(start, TUNED[spec.controller], cost, evaluations)
+    def is_steady(settings: ControllerFile) -> bool:
+        control = settings.make(robot, **told_of_loop(robot, around))
+        return has_delay_margin(robot, control, around, LEAST_DELAY)
+
+    begin = start if is_steady(_with(spec, start)) else _start(replace(spec, options={}), robot, around.dt)
+    best = _search(begin, TUNED[spec.controller], cost, evaluations)
     old, new, fresh = _with(spec, start), _with(spec, best), replace(around, seed=seed + 1)
     before, tried = (_score(robot, held_out, judged, gains, fresh) for gains in (old, new))
-    if tried.cost > (1.0 - LEAST_GAIN) * before.cost:
+    if tried.cost > (1.0 - LEAST_GAIN) * before.cost and (is_steady(old) or not is_steady(new)):
         new = old
     after = before if new is old else tried
-    own_before, own_after = (_score(robot, [robot], judged, gains, fresh) for gains in (old, new))
+    itself = [_Variant(robot, kit)]
+    own_before, own_after = (_score(robot, itself, judged, gains, fresh) for gains in (old, new))
+    margins = loop_margins(robot, new.make(robot, **told_of_loop(robot, around)), around)
     names, judged_names = (tuple(route.name for route in routes) for routes in (follow, judged))
     source = f"tuned for {robot.name} on {all_of(names)}, {draws} draws, seed {seed}"
     return Tuned(
@@ -291,6 +310,7 @@ def tune(
         around.delay,
         around.dt,
         str(kit),
+        margins,
     )
 
 
@@ -326,6 +346,39 @@ def _paths(robot: Robot) -> tuple[list[Path], list[Path]]:
     period, turn = next(able, words[-1])
     training, held_out = ([path_named(name.format(period, turn)) for name in names] for names in (TRAINING, HELD_OUT))
     return training, held_out
+
+
+LATENCY, LEAST_DELAY = 0.01, 0.015  # [s]
+WORSE = 2.0  # times as few counts and new poses, as much noise
+UNSTEADY = 1e3  # times the cost of settings without that delay margin
+
+
+class _Variant(NamedTuple):
+    """A robot that is driven, and with which it is measured."""
+
+    plant: Robot
+    kit: Instruments
+
+
+def _variants(robots: Sequence[Robot], kit: Instruments) -> list[_Variant]:
+    """Robots in loops that may be: a little later, a little earlier with worse sensors, as they are."""
+    variants = []
+    for k, robot in enumerate(robots):
+        latency = max(0.0, robot.drive.latency + LATENCY * (1.0, -1.0, 0.0)[k % 3])
+        plant = robot.replace(drive=robot.drive.replace(latency=latency))
+        variants.append(_Variant(plant, _worse(kit) if k % 3 == 1 else kit))
+    return variants
+
+
+def _worse(kit: Instruments) -> Instruments:
+    """Sensors a step worse."""
+    sensors = kit.sensors
+    names = ("gyro_noise", "gyro_bias", "pose_noise", "heading_noise")
+    noise = {name: WORSE * value for name in names if (value := getattr(sensors, name)) is not None}
+    fewer = {name: value / WORSE for name in ("pose_rate",) if (value := getattr(sensors, name)) is not None}
+    counts = sensors.encoder_counts
+    rounded = {} if counts is None else {"encoder_counts": max(1.0, round(counts / WORSE))}
+    return replace(kit, sensors=sensors.replace(**noise, **fewer, **rounded))
 
 
 RESISTANCE, MASS, RADIUS = 0.15, 0.1, 0.003  # by which a robot may be off whose file says nothing of that
@@ -404,7 +457,7 @@ def _with(spec: ControllerFile, gains: Gains) -> ControllerFile:
 
 
 def _score(
-    robot: Robot, plants: Sequence[Robot], paths: Sequence[Path], spec: ControllerFile, around: Circumstances
+    robot: Robot, variants: Sequence[_Variant], paths: Sequence[Path], spec: ControllerFile, around: Circumstances
 ) -> TuningScore:
     """What a controller for one robot comes to when it drives the others, free and pushed."""
     control = spec.make(robot, **told_of_loop(robot, around))
@@ -415,11 +468,11 @@ def _score(
         for pushed in (False, True) if force.any() else (False,):
             row = []
             weights.append(PUSHED if pushed else 1.0)
-            for k, plant in enumerate(plants):
+            for k, (plant, kit) in enumerate(variants):
                 seed = [around.seed, k, len(rows)]
                 push = pushes(force, around.duration or path.duration, np.random.default_rng(seed)) if pushed else None
                 number = int(np.random.default_rng(seed).integers(2**31))
-                under = replace(around, seed=number, **({} if push is None else {"push": push}))
+                under = replace(around, seed=number, sensors=kit, **({} if push is None else {"push": push}))
                 row.append(tracked(plant, path, control, under))
             rows.append(row)
     runs = [run for row in rows for run in row]
