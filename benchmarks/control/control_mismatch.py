@@ -18,6 +18,7 @@ from benchmarks.control_real.plant import Plant
 from benchmarks.control_real.robots import NUMBERS, Numbers
 from benchmarks.table import Table, machine
 from omnidyn.arrays import FloatArray
+from omnidyn.control.controller import SWINGS
 
 MORE, LATE, JUMP, MISSING = 1.5, 0.03, 0.05, 0.2  # [1], [s], [m], [1]
 JUMP_EVERY, SLIP_EVERY, SLIP_FROM = 50, 3.0, 2.6  # [steps], [s], [s]
@@ -26,7 +27,7 @@ FRICTION = ("coulomb", "breakaway", "disc", "disc_breakaway")
 CONDITIONS = ("nominal", "friction", "payload", "slip", "jumps", "missing held", "missing", "latency")
 SENSORS = {"axebot": "instantaneous", "xdrive": "encoder", "mecanum": "localised"}
 RIVAL = "PID + kS"
-SEED = 0
+SEED, FAR, WIDE = 0, 5e-3, 5.0  # [1], [m], [mm]
 
 
 def changed(numbers: Numbers, condition: str) -> Numbers:
@@ -73,27 +74,67 @@ class Faulty(Instruments):
         return self._held
 
 
+class Watched:
+    """A controller in a loop: when it first said that the loop swings, and when the robot was first FAR off [s]."""
+
+    def __init__(self, control: Any, plant: Plant) -> None:
+        self._control, self._plant = control, plant
+        self.said = self.far = math.inf
+
+    def step(self, t: float, pose: FloatArray, twist: FloatArray, path: Any) -> FloatArray:
+        """As the controller."""
+        output = self._control.step(t, pose, twist, path)
+        info = getattr(self._control, "info", None)
+        if info is not None and info.status == SWINGS:
+            self.said = min(self.said, t)
+        if math.dist(self._plant.pose[:2], path.at(t).pose[:2]) > FAR:
+            self.far = min(self.far, t)
+        return output
+
+
 def cells_of(robot: str, numbers: Numbers, condition: str, kind: str, seed: int) -> dict[str, tuple[float, ...]]:
-    """Controller -> (mm, mrad, us) on the clover."""
+    """Controller -> (mm, mrad, us, when it said that it swings, when it was far off) on the clover."""
     plant, known, path = Plant(changed(numbers, condition)), Plant(numbers), paths()["clover"]
 
     def equip(sensors: str, driven: Plant, number: int) -> Faulty:
         return Faulty(sensors, driven, number, condition)
 
-    return {
-        name: errors(plant, make(known), path, kind, seed, equip) for name, make in makers(robot, numbers, kind).items()
-    }
+    cells = {}
+    for name, make in makers(robot, numbers, kind).items():
+        control = Watched(make(known), plant)
+        cells[name] = (*errors(plant, control, path, kind, seed, equip), control.said, control.far)
+    return cells
+
+
+def says_so(cells: dict[str, dict[str, tuple[float, ...]]]) -> tuple[int, int, int, int]:
+    """Of one robot, by condition: cells with LATE that are WIDE off and say nothing within a second, all of them.
+
+    Then nominal cells that say it, and cells of wrong models, less than twice as far off as the nominal one, that do.
+    """
+    silent = nominal = wrong = 0
+    for name in OURS:
+        _, _, _, said, far = cells["latency"][name]
+        silent += cells["latency"][name][0] > WIDE and said > far + 1.0
+        nominal += math.isfinite(cells["nominal"][name][3])
+        wrong += sum(
+            math.isfinite(cell[name][3]) and cell[name][0] < 2.0 * cells["nominal"][name][0]
+            for condition, cell in cells.items()
+            if condition not in ("nominal", "latency")
+        )
+    return silent, len(OURS), nominal, wrong
 
 
 def table_of(robots: dict[str, tuple[Numbers, str]], seed: int) -> Table:
     """A row per robot and condition."""
-    columns = ["robot", "sensors", "condition", *makers("axebot", NUMBERS["axebot"], ""), *OURS_RATIOS, "lost"]
+    columns = ["robot", "sensors", "condition", *makers("axebot", NUMBERS["axebot"], ""), *OURS_RATIOS, "swings", "lost"]
     title = "control_mismatch: rms of position mm / heading mrad on the clover, models wrong or sensors bad"
     table = Table(title, columns, notes=[f"ratios: to {RIVAL}", machine()])
     count = dict.fromkeys(OURS, 0)
+    swings = np.zeros(4, int)
     for robot, (numbers, kind) in robots.items():
+        by_condition = dict[str, dict[str, tuple[float, ...]]]()
         for condition in CONDITIONS:
-            cells = cells_of(robot, numbers, condition, kind, seed)
+            cells = by_condition[condition] = cells_of(robot, numbers, condition, kind, seed)
             words: dict[str, Any] = {name: f"{cell[0]:.2f}/{cell[1]:.2f}" for name, cell in cells.items()}
             beaten, best = [], cells[RIVAL]
             for name in OURS:
@@ -105,10 +146,19 @@ def table_of(robots: dict[str, tuple[Numbers, str]], seed: int) -> Table:
                 ]
                 beaten += [f"{name} {unit}" for unit in lost]
                 count[name] += len(lost)
+            words["swings"] = ", ".join(f"{name} {cells[name][3]:.1f} s" for name in OURS if cells[name][3] < math.inf)
             table.add(robot=robot, sensors=kind, condition=condition, lost=", ".join(beaten), **words)
+        swings += says_so(by_condition)
     total = 2 * len(table.rows)
     for name in OURS:
         table.add("0 cells", count[name] == 0, robot="all", sensors=name, lost=f"{count[name]} of {total}")
+    silent, late, nominal, wrong = swings.tolist()
+    cells = len(robots) * len(OURS)
+    words = f"{silent} of {late}"
+    table.add("0 cells", silent == 0, robot="all", sensors="late, 5 mm off, silent for a second", lost=words)
+    table.add("0 cells", nominal == 0, robot="all", sensors="nominal and said to swing", lost=f"{nominal} of {cells}")
+    words = f"{wrong} of {cells * (len(CONDITIONS) - 2)}"
+    table.add("1 cell", wrong <= 1, robot="all", sensors="wrong model, little off, said to swing", lost=words)
     return table
 
 
@@ -117,4 +167,4 @@ OURS_RATIOS = tuple(f"{name} ratio" for name in OURS)
 
 def measure() -> Table:
     """The three robots."""
-    return table_of({robot: (numbers, SENSORS[robot]) for robot, numbers in NUMBERS.items()}, SEED)
+    return table_of({robot: (NUMBERS[robot], kind) for robot, kind in SENSORS.items()}, SEED)

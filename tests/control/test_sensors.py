@@ -157,6 +157,9 @@ def test_what_a_fit_found_of_its_logs_is_what_controllers_take():
     fitted = AXEBOT.replace(log=LogEffects(latency=late))
     assert fitted.sensor_model == Sensors(twist="mean", pose_delay=0.05)
     assert fitted.replace(sensors=Sensors()).sensor_model == Sensors()
+    noisy = fitted.replace(log=LogEffects(latency=late, pose_rate=30.0, pose_noise=1e-3, heading_noise=2e-3))
+    expected = Sensors(twist="mean", pose_delay=0.05, pose_rate=30.0, pose_noise=1e-3, heading_noise=2e-3)
+    assert noisy.sensor_model == expected
     assert AXEBOT.sensor_model == Sensors()
 
 
@@ -196,6 +199,10 @@ def test_a_fit_to_counts_of_wheels_gives_means_and_says_what_controllers_take_of
     fitted = found.estimate.robot
     assert fitted.sensor_model.twist == "mean"
     assert fitted.sensor_model.pose_delay == pytest.approx(late * dt, abs=0.01)
+    assert fitted.sensor_model.pose_rate == pytest.approx(1.0 / dt, rel=1e-6)
+    assert fitted.sensor_model.pose_noise == pytest.approx(5e-4, rel=0.15)
+    assert fitted.sensor_model.heading_noise == pytest.approx(5e-4, rel=0.2)
+    assert fitted.sensors is None  # of the log: what feeds the loop says the file
     assert "pose_lag_of_log" in [step.code for step in found.advice]
 
 

@@ -124,7 +124,9 @@ def _twist_frame(finding: Finding, columns: Mapping[str, Column]) -> Columns | N
 
 
 def _lag(finding: Finding, columns: Mapping[str, Column]) -> Columns | None:
-    """The later of two channels at the times when it happened."""
+    """The later of two channels at the times when it happened; poses stay: how late they are, a controller needs."""
+    if finding.numbers["late"] == "pose":
+        return None
     late = finding.numbers["late"].split()
     return _later(
         [n for n in columns if n in late or component_channel(n) in late], abs(finding.numbers["seconds"]), columns

@@ -138,6 +138,7 @@ class LogEffects(Value):
     """gain: of the voltage. fade: share of it lost from the start of a run to its end, evenly. tilt: constant force
     along x and y of the room [N]: of the headings of the log, or as the robot stood when it began. push: constant force
     along x and y of the body [N] and about yaw [N m]. latency: of the channels. of: marks of the logs, see `log_mark`.
+    pose_rate [Hz], pose_noise [m], heading_noise [rad]: of its poses, as of `Sensors`.
     """
 
     gain: Annotated[Annotated[float, number(0.01, 100.0)], Field(description="of the voltage, a battery")] = 1.0
@@ -153,6 +154,17 @@ class LogEffects(Value):
         Annotated[Levels, per_axis_number(-HARDEST, HARDEST)], Field(description="force on the body, N, N, N m")
     ] = (0.0, 0.0, 0.0)
     latency: Lateness = Lateness()
+    pose_rate: Annotated[
+        Annotated[float, number(0.1, FASTEST)] | None, Field(alias="pose_rate_Hz", description="of new poses")
+    ] = None
+    pose_noise: Annotated[
+        Annotated[float, number(0.0, NOISIEST)] | None,
+        Field(alias="pose_noise_m", description="std of a pose along x and along y"),
+    ] = None
+    heading_noise: Annotated[
+        Annotated[float, number(0.0, NOISIEST)] | None,
+        Field(alias="heading_noise_rad", description="std of the heading of a pose"),
+    ] = None
     of: Annotated[Annotated[tuple[Text, ...], BeforeValidator(to_list)], Field(description="marks of these logs")] = ()
 
     def is_of(self, run: Run) -> bool:
@@ -182,7 +194,8 @@ def sensors_of(sensors: Sensors | None, log: LogEffects | None, drive: float) ->
     late = log.latency
     behind = 0.0 if late.position is None else float(late.position) - drive
     counted = late.averaged or late.wheel_angle is not None
-    return Sensors(twist=MEAN if counted else INSTANTANEOUS, pose_delay=min(max(behind, 0.0), LATEST_POSE))
+    camera = {name: getattr(log, name) for name in ("pose_rate", "pose_noise", "heading_noise")}
+    return Sensors(twist=MEAN if counted else INSTANTANEOUS, pose_delay=min(max(behind, 0.0), LATEST_POSE), **camera)
 
 
 def log_mark(run: Run) -> str:

@@ -9,6 +9,7 @@ from omnidyn.findings.check import check
 from omnidyn.findings.signal.robust import clusters, slope
 from omnidyn.logs.log import Log
 from omnidyn.simulation.simulate import simulate
+from omnidyn.telling.codes import remedy
 
 
 def test_noise_in_both_channels_does_not_pull_a_slope_down():
@@ -95,6 +96,13 @@ def test_a_late_channel(log, robot, with_channels, name, rows):
     sizes = [abs(finding.numbers["rows"]) for finding in found if name in finding.subject]
     assert sizes
     assert sizes[0] == pytest.approx(rows, abs=0.25)
+
+
+def test_late_poses_stay_where_they_are(log, robot, with_channels):
+    late = np.vstack([log.channels["pose"][:1]] * 6 + [log.channels["pose"][:-6]])
+    (finding,) = check(with_channels(pose=late, twist=None), robot).of("lag")
+    assert finding.numbers["late"] == "pose"
+    assert "leave it: identify fits how late poses are" in remedy(finding)
 
 
 def test_half_a_row_is_a_note(log, robot, with_channels):

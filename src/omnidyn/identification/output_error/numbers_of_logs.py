@@ -27,6 +27,7 @@ from omnidyn.model.keys import find_key, with_priors
 from omnidyn.model.log_effects import Lateness, LogEffects, log_mark
 from omnidyn.model.robot import JOINT, WITH_THE_FIT, Prior, Robot
 from omnidyn.run import Run
+from omnidyn.statistics import robust_std
 
 LATENCY_ERRORS = 2.0  # standard errors within which a latency is like none
 
@@ -126,8 +127,40 @@ def _effects(
         latency=latency,
         tilt=(tilt[0], tilt[1]),
         push=(push[0], push[1], push[2]),
+        **_poses(runs),
     )
     return None if effects == LogEffects() else effects.replace(of=tuple(log_mark(run) for run in runs))
+
+
+LEAST_POSES, LEAST_NOISE = 50, 1e-4  # [1], [m] std: poses with less are counted, or of a simulation
+LONGEST_STEP = 3.5  # usual steps from one pose to the next: what is longer is a gap
+
+
+def _poses(runs: Sequence[Run]) -> dict[str, float]:
+    """Rate and noise of new poses; nothing where there are few, or none that is noisy."""
+    seconds, thirds = [], []
+    for run in runs:
+        if run.pose is None:
+            continue
+        rows = np.isfinite(run.pose).all(axis=1)
+        t, poses = run.t[rows], run.pose[rows]
+        is_new = np.append(True, (np.diff(poses, axis=0) != 0.0).any(axis=1))[: len(t)]
+        t, poses = t[is_new], poses[is_new]
+        seconds.append(np.diff(t))
+        thirds.append(np.diff(np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])]), n=3, axis=0))
+    if sum(map(len, thirds)) < LEAST_POSES:
+        return {}
+    # What moves smoothly has small third differences; those of noise have sqrt(1 + 9 + 9 + 1) times its std.
+    std = [float(robust_std(column)) / np.sqrt(20.0) for column in np.concatenate(thirds).T]
+    place = float(np.sqrt(np.mean(np.square(std[:2]))))
+    if place < LEAST_NOISE:
+        return {}
+    steps = np.concatenate(seconds)
+    return {
+        "pose_rate": float(1.0 / np.mean(steps[steps <= LONGEST_STEP * np.median(steps)])),
+        "pose_noise": place,
+        "heading_noise": float(std[2]),
+    }
 
 
 def _added_up(run: Run, latency_by_channel: Mapping[str, float]) -> bool:
