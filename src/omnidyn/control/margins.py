@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,9 +25,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds
 from omnidyn.simulation.live import LiveRobot
 
-if TYPE_CHECKING:
-    from omnidyn.control.closed_loop import Circumstances
-
 MOST_DELAY, MOST_GAIN = 0.06, 4.0  # [s]; times
 HALVINGS = 5
 SECONDS, LEAST_STEPS = 2.0, 100
@@ -35,6 +32,19 @@ END = 0.25  # of it
 SETTLED = 0.02  # of the speeds: so little they scatter in the end
 SLOWER = 0.8  # times the speed of the path, at first
 SHARES = np.array([0.25, 0.15, 0.2])  # of the top speeds: that of the path
+
+
+class LoopConditions(Protocol):
+    """Of the loop: time between two steps [s], steps until an output acts, volts behind a duty, and what measures it."""
+
+    @property
+    def dt(self) -> float: ...
+    @property
+    def delay(self) -> int: ...
+    @property
+    def supply(self) -> float | None: ...
+    @property
+    def sensors(self) -> Instruments | None: ...
 
 
 @dataclass(frozen=True)
@@ -48,7 +58,7 @@ class Margins:
     gain: float
 
 
-class _Steady(Path):
+class _SteadyTwist(Path):
     """A twist in the frame of the body [m/s, m/s, rad/s] that never changes."""
 
     name, duration, end = "steady", SECONDS, np.inf
@@ -67,7 +77,7 @@ class _Steady(Path):
         return Reference(place, velocity, change)
 
 
-def loop_margins(plant: Robot, controller: Controller, around: Circumstances) -> Margins:
+def loop_margins(plant: Robot, controller: Controller, around: LoopConditions) -> Margins:
     """The margins of a controller that drives a robot; it begins anew, and forgets all steps in the end."""
     speeds = SHARES * top_speeds(plant)
     if not (np.isfinite(speeds) & (speeds > 0.0)).all():
@@ -87,7 +97,7 @@ def loop_margins(plant: Robot, controller: Controller, around: Circumstances) ->
     return Margins(delay, gain)
 
 
-def has_delay_margin(plant: Robot, controller: Controller, around: Circumstances, delay: float) -> bool:
+def has_delay_margin(plant: Robot, controller: Controller, around: LoopConditions, delay: float) -> bool:
     """Whether a loop still settles where its outputs act so much later [s]."""
     speeds = SHARES * top_speeds(plant)
     later = plant.replace(drive=plant.drive.replace(latency=plant.drive.latency + delay))
@@ -108,9 +118,9 @@ def _largest(settles: Callable[[float], bool]) -> float:
     return low
 
 
-def _settles(plant: Robot, controller: Controller, around: Circumstances, speeds: FloatArray, gain: float) -> bool:
+def _settles(plant: Robot, controller: Controller, around: LoopConditions, speeds: FloatArray, gain: float) -> bool:
     """Whether a loop does, its outputs so many times as strong."""
-    path, dt, kit = _Steady(speeds), around.dt, around.sensors or Instruments(plant.sensor_model)
+    path, dt, kit = _SteadyTwist(speeds), around.dt, around.sensors or Instruments(plant.sensor_model)
     still = kit.sensors.replace(
         encoder_counts=None, gyro_noise=None, gyro_bias=None, pose_noise=None, heading_noise=None
     )

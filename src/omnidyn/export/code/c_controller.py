@@ -153,7 +153,7 @@ def _can_swing(law: Any) -> bool:
     return isinstance(law, Pid | Mpc)
 
 
-def _swing_code(law: Pid | Mpc) -> str:
+def _swing_code(law: Any) -> str:
     """The function that finds out whether its loop swings."""
     defines = f"#define SWING_CHANGES {CHANGES}\n#define SWING_WINDOW {_c(WINDOW)}"
     least = f"static const float SWING_LEAST[3] = {{{_numbers(law.swing.least)}}};"

@@ -127,8 +127,7 @@ def _effects(
         latency=latency,
         tilt=(tilt[0], tilt[1]),
         push=(push[0], push[1], push[2]),
-        **_poses(runs),
-    )
+    ).replace(**_poses(runs))
     return None if effects == LogEffects() else effects.replace(of=tuple(log_mark(run) for run in runs))
 
 
