@@ -14,17 +14,17 @@ robot = omnidyn.load_robot("axebot")
 envs = RobotVectorEnv(256, robot, "path", path="eight", duration=2.0, autoreset_mode="SameStep")
 model = PPO(
     "MlpPolicy",
-    VecNormalize(sb3_env(envs)),
-    n_steps=32,
+    VecNormalize(sb3_env(envs), gamma=0.8),
+    n_steps=16,
     batch_size=1024,
     n_epochs=5,
-    gamma=0.9,
-    learning_rate=1e-3,
-    policy_kwargs={"net_arch": [32], "log_std_init": -1.0},
+    gamma=0.8,
+    learning_rate=lambda left: 2e-3 * left,
+    policy_kwargs={"net_arch": [64], "log_std_init": -1.0},
     seed=0,
     device="cpu",
 )
-model.learn(1_000_000)
+model.learn(2_000_000)
 policy = policy_of_sb3(model, "path")  # the scales of VecNormalize are in it
 tracked = omnidyn.track(robot, "eight", [Policy(robot, policy=policy), "pid"])
 for one in tracked:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.arguments import check_order
+from omnidyn.arguments import check_order, seed_of
 from omnidyn.errors import InputError
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moving_axes
 from omnidyn.run import Run
@@ -87,3 +87,20 @@ def test_the_name_of_a_robot_is_no_robot_anywhere(call):
     """It was AttributeError: 'str' object has no attribute 'motor'."""
     with pytest.raises(InputError, match=r"no Robot; got the text 'axebot'.*load_robot"):
         call("axebot")
+
+
+def test_random_numbers_come_from_a_seed_or_a_generator():
+    """As `rng=` of NumPy: a seed gives the same numbers always, a generator gives new ones each time."""
+    assert seed_of(7) == seed_of(np.int64(7)) == 7
+    assert seed_of(np.random.default_rng(1)) == seed_of(np.random.default_rng(1))
+    generator = np.random.default_rng(1)
+    assert seed_of(generator) != seed_of(generator)
+    factors = {"body.mass_kg": (0.8, 1.2)}
+    first, again, other = (
+        omnidyn.sample(ROBOT, 3, np.random.default_rng(k), factors=factors).values for k in (1, 1, 2)
+    )
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+    for wrong in (-1, 1.5, "one", True):
+        with pytest.raises(InputError, match=r"rng: no source of random numbers.*expected a whole number"):
+            seed_of(wrong)

@@ -30,12 +30,15 @@ XML = """<mujoco><option timestep="{dt}" gravity="0 0 0" integrator="implicitfas
 </worldbody><actuator><motor joint="x"/><motor joint="y"/><motor joint="w"/></actuator></mujoco>"""
 
 
-def cpp(folder: Path, fused: bool) -> Any:
-    """The library of loop.cpp, compiled into a folder; None where there is no g++. fused: multiply and add in one."""
+def cpp(folder: Path, fused: bool, march: str = "native") -> Any:
+    """The library of loop.cpp, compiled into a folder; None where there is no g++. fused: multiply and add in one.
+
+    march: the processor that it is compiled for.
+    """
     if shutil.which("g++") is None:
         return None
     library = folder / f"libloop{fused:d}.so"
-    flags = [*FLAGS.split(), f"-ffp-contract={'fast' if fused else 'off'}"]
+    flags = [*FLAGS.replace("native", march).split(), f"-ffp-contract={'fast' if fused else 'off'}"]
     subprocess.run(["g++", *flags, "-o", str(library), str(SOURCE)], check=True)
     loaded = ctypes.CDLL(str(library))
     loaded.multiply_adds.restype = loaded.divisions.restype = ctypes.c_double

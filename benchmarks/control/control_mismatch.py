@@ -126,7 +126,8 @@ def says_so(cells: dict[str, dict[str, tuple[float, ...]]]) -> tuple[int, int, i
 
 def table_of(robots: dict[str, tuple[Numbers, str]], seed: int) -> Table:
     """A row per robot and condition."""
-    columns = ["robot", "sensors", "condition", *makers("axebot", NUMBERS["axebot"], ""), *OURS_RATIOS, "swings", "lost"]
+    names = makers("axebot", NUMBERS["axebot"], "")
+    columns = ["robot", "sensors", "condition", *names, *OURS_RATIOS, "swings", "lost"]
     title = "control_mismatch: rms of position mm / heading mrad on the clover, models wrong or sensors bad"
     table = Table(title, columns, notes=[f"ratios: to {RIVAL}", machine()])
     count = dict.fromkeys(OURS, 0)

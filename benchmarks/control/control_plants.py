@@ -14,7 +14,8 @@ import numpy as np
 import omnidyn
 from benchmarks.control.control import mean
 from benchmarks.table import Table, machine
-from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
+from omnidyn.control.circumstances import Circumstances
+from omnidyn.control.closed_loop import told_of_loop, tracked
 from omnidyn.control.controllers import NAMES, ControllerFile
 from omnidyn.control.paths.path import path
 from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction

@@ -14,7 +14,8 @@ import omnidyn
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.kinds import KINDS, maker
-from omnidyn.export.ros.ros2_control import odometry_error, ros2_control
+from omnidyn.export.ros.odometry_covariance import odometry_error
+from omnidyn.export.ros.ros2_control import ros2_control
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run

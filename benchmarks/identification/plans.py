@@ -18,6 +18,7 @@ import omnidyn
 from benchmarks.size import scaled
 from benchmarks.table import Table, machine, one_core
 from omnidyn.identification.methods import OutputError
+from omnidyn.model.deadzone import axis_patterns
 from omnidyn.model.keys import Key, friction_keys
 from omnidyn.paper.tables import TABLE_4
 
@@ -60,7 +61,7 @@ def off(robot: omnidyn.Robot, share: float, rng: np.random.Generator) -> omnidyn
 
 def programs(robot: omnidyn.Robot) -> dict[str, Callable[[np.random.Generator], Array]]:
     """Voltages of a minute [V], shape (rows, wheels), that others would drive."""
-    patterns = omnidyn.axis_patterns(robot)
+    patterns = axis_patterns(robot)
     limit = float(np.min(robot.motor.voltage_limit))
     t = DT * np.arange(ROWS)
 

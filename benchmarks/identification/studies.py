@@ -23,8 +23,8 @@ from benchmarks.wrong_worlds.log import AR, SPEEDS
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE, World
 from benchmarks.wrong_worlds.world import WHEELS as AT_WHEELS
 from omnidyn.identification.identify import identify
-from omnidyn.identification.methods import SteadyState
-from tests.support import constant_speeds, laws_in_place, rounded_logs, shapes_offered, starts
+from omnidyn.identification.methods import MotorFit, SteadyState
+from tests.support import constant_speeds, held_axis, laws_in_place, rounded_logs, shapes_offered, starts
 from tests.support.axebot_logs import NOISE
 from tests.support.bench_motor import BenchMotor
 from tests.support.held_commands import commands, lack_of
@@ -107,6 +107,9 @@ def studies() -> Iterator[Study]:
             yield Study(f"motor, {name} {how or ''}".strip(), draw, 25, dict.fromkeys(ALL, 0.92))
     draw = partial(motor_held, motor=BenchMotor(drag=0.02), names=("start",), how={})
     yield Study("motor, bent line", draw, 25, {"start": 0.92})
+    yield Study(
+        "motor, viscous friction with and without a band", right_motor, 200, {"nothing else": 0.95, "a line": 0.995}
+    )
     yield Study("steady states, shapes that are offered", calm_shapes, 50, dict.fromkeys(shapes_offered.OFFERED, 0.98))
     others = dict.fromkeys(shapes_offered.NOT_OFFERED, KEPT)
     yield Study("steady states, other shapes", found_shapes, 30, others)
@@ -174,6 +177,17 @@ def noise_levels(number: int, memory: float) -> Cases:
 
 def motor_held(number: int, motor: BenchMotor, names: Sequence[str], how: dict[str, float]) -> Cases:
     return held_of(motor, number, names, **how)
+
+
+def right_motor(number: int) -> Cases:
+    """An axis under held levels: a dead band or none, and neither an offset nor a latency nor a curve."""
+    rng, put_in = np.random.default_rng(1000 + number), held_axis.stairs(number)
+    slope, band = rng.uniform(0.2, 1.0), 0.0 if number % 2 else rng.uniform(0.2, 0.6)
+    _, speed = held_axis.axis(put_in, slope=(slope, slope), band=band)
+    log = held_axis.run_of(put_in, speed, number, noise=rng.uniform(0.005, 0.05))
+    study = identify([log], None, MotorFit(between="hold")).study
+    numbers = {"slope", "lag", "inertia"} | ({"dead_band"} if band else set())
+    return {"nothing else": [set(study.motors[0].value) <= numbers], "a line": [not study.curves]}
 
 
 def calm_shapes(number: int) -> Cases:

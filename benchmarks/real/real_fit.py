@@ -15,10 +15,11 @@ import numpy as np
 from benchmarks.real import real_loop, real_nuisances, udea
 from benchmarks.table import Table, machine
 from omnidyn.identification.methods import AUTO
-from omnidyn.identification.motors.choice import choose_motor, fit_rmse, run_motor
+from omnidyn.identification.motors.choice import fit_rmse, run_motor
+from omnidyn.identification.motors.choose_motor import choose_motor
 from omnidyn.identification.motors.estimate import MotorEstimate
 from omnidyn.identification.motors.fit import fit_motor
-from omnidyn.identification.motors.log import MEAN
+from omnidyn.identification.motors.input_between_rows import MEAN
 from omnidyn.logs.run_file import write_run
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
 from benchmarks.table import Table
-from omnidyn.identification.motors.choice import choose_motor, run_motor
+from omnidyn.identification.motors.choice import run_motor
+from omnidyn.identification.motors.choose_motor import choose_motor
 from omnidyn.identification.motors.estimate import MotorEstimate
 from omnidyn.identification.motors.fit import fit_motor
-from omnidyn.identification.motors.log import HOLD, MEAN
+from omnidyn.identification.motors.input_between_rows import HOLD, MEAN
 from omnidyn.logs.read_log import read_log
 from omnidyn.run import Run
 from tests.support import real_logs as logs

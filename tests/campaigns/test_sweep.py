@@ -7,20 +7,22 @@ import random
 import signal
 import subprocess
 import sys
+import threading
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from omnidyn import files
-from omnidyn.campaigns.executors import _quiet
+from omnidyn.campaigns.executors import Given, _quiet
 from omnidyn.campaigns.sweep import sweep
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.files import sha256
 from tests.support import campaign_tasks
 from tests.support.campaign_tasks import MARKS, mass, product, raising
+from tests.support.growth import LINEAR, growth
 
 ROOT = Path(__file__).parents[2]
 AB = {"task.a": {"range": [0.0, 1.0]}, "task.b": {"range": [1.0, 2.0]}}
@@ -134,6 +136,31 @@ def test_a_dead_scheduler_is_one_sentence_and_what_is_done_stays(tmp_path, threa
     with Ended(1) as pool, pytest.raises(OmnidynError, match="the executor has ended; got CancelledError; start it"):
         sweep(SPEC, tmp_path / "x", task=product, executor=pool)
     assert sweep(None, tmp_path / "x", task=product, executor=threads).status.complete
+
+
+class Later(Executor):
+    """An executor that ends its calls one by one, while others wait for the last one that was asked for."""
+
+    def __init__(self):
+        self.futures = []
+
+    def submit(self, function, *arguments):
+        self.futures.append(Future())
+        return self.futures[-1]
+
+
+def test_what_a_shard_that_ends_costs_does_not_grow_with_those_that_are_left():
+    def run(count, _):
+        later = Later()
+        ends = Given(later).run(print, ((k, ()) for k in range(count)))
+        for k in range(count):
+            if not k:  # `run` begins with its first answer: all calls are there then
+                threading.Timer(0.01, lambda: later.futures[0].set_result(None)).start()
+            else:
+                later.futures[k].set_result(None)
+            assert next(ends) == (k, "")
+
+    assert growth(run, 4000) < LINEAR
 
 
 def test_the_library_of_a_cluster_is_quiet_within_it(caplog):

@@ -195,3 +195,22 @@ def test_how_far_it_is_is_told_of_each_controller():
     ]
     assert [report.done for report in reports[: len(reports) // 2]] == [0, 64, 128, 192]
     assert {report.total for report in reports} == {200}
+
+
+def test_several_are_one_tracking_and_a_sequence_of_each():
+    several = omnidyn.track(AXEBOT, "circle", ["feedforward", "pid"], duration=1.0, dt=0.01)
+    alone = omnidyn.track(AXEBOT, "circle", "pid", duration=1.0, dt=0.01)
+    assert [tracking.controller for tracking in several] == ["feedforward", "pid"]
+    assert several.controller == several[0].controller == "feedforward"
+    assert several.rmse_position == several[0].rmse_position
+    assert several[1].rmse_position == several.best.rmse_position == alone.rmse_position
+    assert list(alone) == [alone]
+    assert not several[0].others
+    assert "pid" in several.summary()
+
+
+def test_an_option_that_the_loop_has_not_is_told_with_the_nearest():
+    with pytest.raises(InputError, match=r"no such option; got durration.*did you mean duration"):
+        omnidyn.track(AXEBOT, "circle", "pid", durration=1.0)
+    with pytest.raises(InputError, match="no such option; got skip"):
+        omnidyn.tune(AXEBOT, "circle", "pid", skip=1.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.control.closed_loop import Circumstances
+from omnidyn.control.circumstances import Circumstances
 from omnidyn.control.controller import Safe
 from omnidyn.control.controllers import controller_named
 from omnidyn.control.margins import MOST_DELAY, MOST_GAIN, SETTLED, SLOWER, Margins, loop_margins

@@ -7,7 +7,7 @@ import pytest
 
 import omnidyn
 from omnidyn.control import tune as tuning
-from omnidyn.control.closed_loop import Circumstances
+from omnidyn.control.circumstances import Circumstances
 from omnidyn.control.controllers import ControllerFile, load_controller, save_controller
 from omnidyn.control.instruments import Instruments
 from omnidyn.control.margins import loop_margins
@@ -154,7 +154,8 @@ def test_settings_without_a_delay_margin_are_left(tmp_path):
     """An observer that takes all at once: 5 ms that nobody knows of, and the loop swings. Nothing found is so."""
     bold = tmp_path / "bold.toml"
     bold.write_text(
-        'schema = 1\ncontroller = "mpc"\n[options]\npush_walk = [8.0, 8.0, 25.0]\nvolts = 1e-5\npose = [3e4, 3e4, 3e3]\n',
+        'schema = 1\ncontroller = "mpc"\n[options]\npush_walk = [8.0, 8.0, 25.0]\nvolts = 1e-5\n'
+        "pose = [3e4, 3e4, 3e3]\n",
         "utf-8",
     )
     robot = AXEBOT.replace(sensors=Sensors(twist="mean", encoder_counts=4096))

@@ -25,7 +25,7 @@ ALLOWED = {
     "identification/output_error/problem/heading.py": (1, "an integral over all rows, each filled"),
     "identification/output_error/memory/whitened.py": (2, "rows of one output"),
     "identification/motors/fit.py": (1, "rows of the only output"),
-    "identification/motors/start.py": (1, "a log in the rows of its motors"),
+    "identification/motors/points.py": (1, "a log in the rows of its motors"),
     "identification/output_error/linear/missing_inputs.py": (1, "not asked of clocks of their own"),
     "identification/output_error/problem/decimated.py": (3, "all rows, of which several are taken together"),
     "identification/structure/windows.py": (1, "the rows between which a command holds"),

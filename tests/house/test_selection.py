@@ -10,7 +10,7 @@ IDENTIFICATION = Path(__file__).resolve().parents[2] / "src" / "omnidyn" / "iden
 RULE = re.compile(
     r"std\(ddof=1\)\)? \* np\.sqrt\(len\(|^(PAYS|TIE|\w*(GAIN|BETTER|LOSS|SHAPE)_ERRORS) = ", re.MULTILINE
 )
-OTHER_QUESTIONS = {"output_error/problem/nuisances.py"}
+OTHER_QUESTIONS = {"output_error/problem/driving_voltages.py"}
 
 
 def test_no_further_file_has_a_rule_of_its_own():

@@ -15,7 +15,7 @@ from omnidyn.identification.identification import After, Identification
 from omnidyn.identification.identify import identify
 from omnidyn.identification.lack_of_fit import LackOfFit
 from omnidyn.identification.methods import OutputError, SteadyState
-from omnidyn.identification.motors.study import motors_verdict
+from omnidyn.identification.motors.motor_verdict import motors_verdict
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.verdict import fit_verdict, fits_verdict, steady_verdict
 from omnidyn.model.keys import BOX

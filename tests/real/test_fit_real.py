@@ -7,7 +7,8 @@ import pytest
 
 from benchmarks.real import real_fit, udea
 from omnidyn import MotorFit, identify
-from omnidyn.identification.motors.choice import choose_motor, fit_rmse
+from omnidyn.identification.motors.choice import fit_rmse
+from omnidyn.identification.motors.choose_motor import choose_motor
 from omnidyn.identification.motors.fit import fit_motor
 from tests.support import real_logs as logs
 

@@ -16,6 +16,7 @@ from tests.support.pages import (
     choose_axebot,
     command,
     drop,
+    laid_out,
     load_again,
     numbers,
     pick,
@@ -57,17 +58,18 @@ def test_from_nothing_to_a_robot(browser, tmp_path):
     log.write_bytes(page.request.get(f"{studio.address}log/log2/log").body())
     robot = tomllib.loads(page.request.get(f"{studio.address}fit/robot.toml").text())
     assert robot["friction"]["axes"]["coulomb"][0]["value"] == pytest.approx(2.2, abs=0.03)  # Table 3
-    report, (line, clauses) = page.request.get(f"{studio.address}fit/report.html").text(), in_clauses(words)
-    assert all(clause in report for clause in (line, *clauses))
+    report = page.request.get(f"{studio.address}fit/report.html").text()
+    assert all(line in report for line in words.splitlines())
+    assert len(words.splitlines()[0].split()) <= 25
     assert_same_numbers(page, log)
 
 
 def test_currents_without_a_sign_are_told_and_mended(browser):
     _, page = browser.start(ROBOTINO)
-    assert verdict(page) == command("check", ROBOTINO, "--json")[0]["verdict"]
+    assert verdict(page) == laid_out(command("check", ROBOTINO, "--json")[0]["verdict"])
     page.click("text=Apply this remedy")
     mended = command("check", ROBOTINO, "--current-unsigned", "--json")[0]["verdict"]
-    page.get_by_text(mended).first.wait_for()
+    page.get_by_text(in_clauses(mended)[0]).first.wait_for()
     page.get_by_text("The same by hand").first.click()
     assert "--current-unsigned" in page.inner_text("#call")
 
@@ -80,7 +82,7 @@ def test_a_click_on_a_shaded_stretch_explains_it(browser, tmp_path):
     said = command("check", path, "--json")[0]["logs"][0]
     with_rows = next(finding for finding in said["findings"] if finding["rows"])
     _, page = browser.start(path)
-    assert verdict(page) == said["verdict"]
+    assert verdict(page) == laid_out(said["verdict"])
     page.wait_for_function("document.querySelector('omni-plot').frames > 0")
     shown(page, "log")
     row = np.mean(with_rows["rows"][0]) - 2  # the first row of the file is its head
@@ -104,7 +106,7 @@ def test_what_cannot_be_read_or_fitted_is_said_and_fit_waits(browser, tmp_path):
     omnidyn.write_run(omnidyn.simulate(robot, np.zeros((600, 3)), 0.01), rest)
     _, page = browser.start(broken)
     words = command("check", broken, "--json")[2].strip().partition("omnidyn: error: ")[2].splitlines()[0]
-    assert as_flags(verdict(page)) == words.replace(f"{tmp_path}/", "")
+    assert as_flags(verdict(page)) == laid_out(words.replace(f"{tmp_path}/", ""))
     page.click("text=Remove")
     tab(page, "Fit")
     assert page.is_disabled("#fit")
@@ -112,7 +114,7 @@ def test_what_cannot_be_read_or_fitted_is_said_and_fit_waits(browser, tmp_path):
     tab(page, "Log")
     drop(page, rest)
     said = command("check", rest, "--json")[0]["verdict"]
-    assert verdict(page) == said
+    assert verdict(page) == laid_out(said)
     choose_axebot(page)
     page.get_by_text("rest.csv: ").wait_for()
     assert page.is_disabled("#fit")
@@ -135,8 +137,8 @@ def test_columns_corrected_by_hand(browser, tmp_path):
     page.get_by_text("Save this map").wait_for()
     saved = tmp_path / "columns.toml"
     saved.write_bytes(page.request.get(f"{studio.address}log/log1/map").body())
-    assert verdict(page) == command("check", wrong, "--map", saved, "--json")[0]["verdict"]
-    assert verdict(page) == command("check", path, "--json")[0]["verdict"]
+    assert verdict(page) == laid_out(command("check", wrong, "--map", saved, "--json")[0]["verdict"])
+    assert verdict(page) == laid_out(command("check", path, "--json")[0]["verdict"])
 
 
 def test_a_fit_goes_on_while_pages_answer_and_can_be_cancelled(browser, tmp_path):
@@ -188,7 +190,7 @@ def test_what_is_missing_is_added_by_a_button(browser, tmp_path):
 def test_a_robot_of_its_own_sizes_is_that_of_init(browser, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     _, page = browser.start()
-    tab(page, "Fit")
+    tab(page, "Robot")
     page.get_by_text("Describe another robot").click()
     page.get_by_label("mass").fill("3000")
     page.click("#make-robot")

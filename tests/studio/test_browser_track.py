@@ -8,7 +8,7 @@ import pytest
 
 import omnidyn
 from omnidyn.model.keys import Key
-from tests.support.pages import choose_axebot, command, load_again, numbers, shown, tab, verdict, write_log
+from tests.support.pages import choose_axebot, command, laid_out, load_again, numbers, shown, tab, verdict, write_log
 
 
 def choose(page, name, *options):
@@ -41,7 +41,7 @@ def assert_tracked(page, *words):
         assert cells[0] == f"{1e3 * controller['rmse_position_m']:.3f}"
         assert cells[2] == f"{1e3 * controller['worst_position_m']:.2f}"
         assert cells[4] == f"{controller['effort_V']:.2f}"
-    assert verdict(page, "#track-verdict") == said["verdict"]
+    assert verdict(page, "#track-verdict") == laid_out(said["verdict"])
     return said
 
 
@@ -51,7 +51,7 @@ def test_controllers_side_by_side(browser, tmp_path):
     assert page.is_disabled("#track")
     assert page.inner_text("#why-track") == "Choose a robot first."
     choose(page, "robot", "axebot")
-    page.get_by_label("size_m").fill("0.4")
+    page.get_by_label("size [m]").fill("0.4")
     page.click("#track:not([disabled])")
     verdict(page, "#track-verdict")
     said = assert_tracked(page, "axebot", "--path", "eight:size_m=0.4", "--controller", "pid", "--controller", "mpc")
@@ -74,7 +74,7 @@ def test_controllers_side_by_side(browser, tmp_path):
     assert page.inner_text("#call-track") == call
     load_again(page)
     tab(page, "Track")
-    assert verdict(page, "#track-verdict") == said["verdict"]
+    assert verdict(page, "#track-verdict") == laid_out(said["verdict"])
     page.get_by_label("rounds").fill("900")
     page.click("#track:not([disabled])")
     page.get_by_text(re.compile(r"tracking with pid, [1-9]\d* %")).wait_for()
@@ -130,7 +130,7 @@ def test_a_drawn_path_is_the_file_that_track_takes_and_a_bad_one_is_told(browser
     page.click("#track:not([disabled])")
     page.get_by_text("no path in this file").wait_for()
     words = command("track", "axebot", "--path", bad)[2].strip().removeprefix("omnidyn: error: ").splitlines()[0]
-    assert verdict(page, "#track-verdict") == words.replace(f"{tmp_path}/", "")
+    assert verdict(page, "#track-verdict") == laid_out(words.replace(f"{tmp_path}/", ""))
 
 
 def test_robots_and_fits_over_the_same_logs(browser, tmp_path, monkeypatch):
@@ -145,7 +145,7 @@ def test_robots_and_fits_over_the_same_logs(browser, tmp_path, monkeypatch):
     page.wait_for_selector("#compared")
     said, code, words = command("compare", first, second, "--robot", "axebot", "--robot", "robotino", "--json")
     assert code == 0, words
-    assert verdict(page, "#compare-verdict") == said["verdict"]
+    assert verdict(page, "#compare-verdict") == laid_out(said["verdict"])
     table = rows(page, "compared")
     assert list(table) == list(said["difference"])
     for name, gap in said["difference"].items():
@@ -174,7 +174,7 @@ def test_fits_are_compared_and_come_back_in_a_workspace(browser, tmp_path, monke
     fit = Path("fit-1.toml")
     fit.write_bytes(page.request.get(f"{studio.address}robot/fit-1.toml").body())
     said = command("compare", first, "--robot", "axebot", "--robot", fit, "--json")[0]
-    assert verdict(page, "#compare-verdict") == said["verdict"]
+    assert verdict(page, "#compare-verdict") == laid_out(said["verdict"])
     for name, scores in said["robots"]["axebot (B)"]["overall"].items():
         assert rows(page, "compared")[name][2] == f"{scores['rmse']:.4g}"
     page.set_input_files("omni-drop[kind=fit] + input", str(later))
@@ -183,7 +183,7 @@ def test_fits_are_compared_and_come_back_in_a_workspace(browser, tmp_path, monke
     page.click("#drift:not([disabled])")
     page.wait_for_selector("#drifted")
     drift = command("drift", fit, later, "--json")[0]
-    assert verdict(page, "#drift-verdict") == drift["verdict"]
+    assert verdict(page, "#drift-verdict") == laid_out(drift["verdict"])
     number = drift["numbers"]["friction.axes.coulomb[0]"]
     assert number["changed"]
     cells = [row.inner_text() for row in page.locator("#drifted tbody tr").all()]

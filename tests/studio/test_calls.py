@@ -88,6 +88,9 @@ class Here:
     async def run(self, job, request, listen):
         return JOBS[job](request, listen, queue.Queue())
 
+    async def ask(self, job, request):
+        return JOBS[job](request, lambda kind, value: None, queue.Queue())
+
     def send(self, message):
         pass
 

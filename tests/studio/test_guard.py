@@ -68,6 +68,19 @@ def test_pages_of_other_sites_get_nothing(studio):
     assert ask(studio.port, "/upload?name=a.csv", "POST", b"x")[0] == 403  # a browser says its origin here
 
 
+def test_a_picture_of_another_site_costs_nothing_and_a_link_is_followed(studio):
+    for site in ("cross-site", "same-site"):  # <img src="http://127.0.0.1:8642/"> says no origin
+        for path in ("/", "/workspace", "/static/studio.js"):
+            image = {"Sec_Fetch_Site": site, "Sec_Fetch_Mode": "no-cors", "Sec_Fetch_Dest": "image"}
+            assert ask(studio.port, path, **image)[0] == 403, (site, path)
+        link = {"Sec_Fetch_Site": site, "Sec_Fetch_Mode": "navigate", "Sec_Fetch_Dest": "document"}
+        assert ask(studio.port, **link)[0] == 200
+        assert ask(studio.port, "/workspace", **link)[0] == 403
+        assert ask(studio.port, **{**link, "Sec_Fetch_Dest": "iframe"})[0] == 403
+    for site in ("same-origin", "none"):
+        assert ask(studio.port, "/static/studio.js", Sec_Fetch_Site=site)[0] == 200
+
+
 @pytest.mark.parametrize("path", SOCKETS)
 def test_sockets_open_for_pages_of_this_server_only(studio, path):
     assert open_socket(studio.port, path, Origin=f"http://127.0.0.1:{studio.port}") == 101

@@ -12,6 +12,7 @@ import numpy as np
 
 import omnidyn
 from omnidyn.cli import main
+from omnidyn.document import in_clauses
 from tests.support.axebot_logs import excitation
 
 
@@ -45,9 +46,15 @@ def tab(page, name):
 
 
 def verdict(page, name="#verdict"):
-    """The sentence on top, without the mark before it."""
-    page.wait_for_selector(name)
-    return page.inner_text(f"{name} .text")
+    """The verdict on top, as `laid_out` writes it, without the mark before it."""
+    texts = "name => (all => all.length && all.map(e => e.innerText))([...document.querySelectorAll(`${name} .text`)])"
+    return "\n".join(page.wait_for_function(texts, arg=name).json_value())
+
+
+def laid_out(words):
+    """A verdict as a page has it: its line, then a line for each point."""
+    line, clauses = in_clauses(words)
+    return "\n".join((line, *clauses))
 
 
 def as_flags(text):
@@ -58,7 +65,7 @@ def as_flags(text):
 def load_again(page):
     """Load the page anew, as a user who waits until something is there."""
     page.reload()
-    page.wait_for_selector("#example")
+    page.wait_for_selector(".panels .q-tab-panel")
 
 
 def pick(page, option):
@@ -97,5 +104,10 @@ def shown(page, name):
     with contextlib.suppress(ImportError):
         from axe_playwright_python.sync_playwright import Axe
 
-        faults = [v["id"] for v in Axe().run(page).response["violations"] if v["impact"] in ("serious", "critical")]
-        assert not faults
+        found = Axe().run(page).response["violations"]
+        faults = [
+            f"{fault['id']}: {[node['html'] for node in fault['nodes']][:3]}"
+            for fault in found
+            if fault["impact"] in ("serious", "critical")
+        ]
+        assert not faults, faults

@@ -11,10 +11,10 @@ from benchmarks.wrong_worlds.world import BOX, ELLIPSE, World
 from omnidyn import MotorFit, MotorLine, OutputError, SteadyState, identify, load_robot, simulate
 from omnidyn.statement import PLACES, Statement
 from tests.identification.motors.test_agree import loop, sweep
-from tests.identification.motors.test_held_out import axis, run_of, stairs
 from tests.identification.motors.test_steady_curve import bent, levels, log
 from tests.support.axebot_logs import excitation, noisy_draw
 from tests.support.constant_speeds import ROUND, once
+from tests.support.held_axis import axis, run_of, stairs
 
 ANSWERS = {"motors_start", "starts_both_ways", "motors_without_dead_band", "motors_no_line", "dead_bands_hardly_known"}
 NO_ANSWER = {"no_motor_answers", "motors_not_answering"}

@@ -19,6 +19,7 @@ from concurrent.futures import (
     Executor,
     Future,
     ProcessPoolExecutor,
+    as_completed,
     wait,
 )
 from contextlib import contextmanager
@@ -120,11 +121,10 @@ class Given:
         """See ShardPool."""
         futures = {self.executor.submit(function, *arguments): shard for shard, arguments in calls}
         try:
-            while futures:
-                for future in wait(futures, return_when=FIRST_COMPLETED).done:
-                    yield futures.pop(future), self._words(future)
+            for future in as_completed(futures):  # `wait` would look at all that are left for each that ends
+                yield futures[future], self._words(future)
         except BaseException as raised:
-            running = [future for future in futures if not future.cancel()]
+            running = [future for future in futures if not future.done() and not future.cancel()]
             if isinstance(raised, Exception):  # nobody may write any more when this has ended; an interrupt waits not
                 wait(running)
             raise

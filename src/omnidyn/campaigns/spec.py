@@ -33,7 +33,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, Strict, ValidationError, model_validator
 
 from omnidyn.arguments import unknown_option
-from omnidyn.control.closed_loop import MOST_DELAY, SKIP
+from omnidyn.control.circumstances import MOST_DELAY, SKIP
 from omnidyn.control.feedforward import DT
 from omnidyn.errors import InputError
 from omnidyn.files import MAX_TOML_BYTES, parse_toml, read_text

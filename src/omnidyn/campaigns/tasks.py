@@ -20,7 +20,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.campaigns.design import numbers, points, sample_count, seed_of
 from omnidyn.campaigns.fits import LOG, Row, check_fit, fit_row
 from omnidyn.campaigns.spec import INPUTS, IdentifyTask, SimulateTask, Spec, TrackTask
-from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
+from omnidyn.control.circumstances import Circumstances
+from omnidyn.control.closed_loop import told_of_loop, tracked
 from omnidyn.control.controller import Controller
 from omnidyn.control.controllers import ControllerFile, check_options, controller_spec
 from omnidyn.control.instruments import instruments

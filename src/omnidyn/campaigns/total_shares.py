@@ -41,7 +41,7 @@ def total_shares(places: FloatArray, y: FloatArray, levels: Sequence[int], is_gr
     block = np.arange(len(y)) * BLOCKS // len(y)
     grams = np.array([basis[block == k].T @ basis[block == k] for k in range(BLOCKS)])
     sides = np.array([basis[block == k].T @ y[block == k] for k in range(BLOCKS)])
-    with_variable = np.asarray(terms > 0, dtype=float).T
+    with_variable = (terms > 0).T.astype(float)
     whole, rest = _shares(grams.sum(axis=0), sides.sum(axis=0), y, with_variable)
     parts = np.array(
         [
@@ -110,5 +110,5 @@ def _polynomials(place: FloatArray, levels: int) -> FloatArray:
         x = np.linspace(-1.0, 1.0, levels)
         table, _ = np.linalg.qr(np.vander(x, min(levels, MOST_DEGREE + 1), increasing=True))
         return (table * math.sqrt(levels) * np.sign(table[-1]))[place.astype(int)]
-    rows = np.polynomial.legendre.legvander(2.0 * place - 1.0, MOST_DEGREE)
-    return np.asarray(rows * np.sqrt(2.0 * np.arange(MOST_DEGREE + 1) + 1.0), dtype=float)
+    rows = np.asarray(np.polynomial.legendre.legvander(2.0 * place - 1.0, MOST_DEGREE), dtype=float)
+    return rows * np.sqrt(2.0 * np.arange(MOST_DEGREE + 1) + 1.0)

@@ -67,7 +67,8 @@ def track(
     _check_outputs(out, report, gif, force)
     files = [name for name in (path, *controller) if name.endswith((".toml", ".csv", ".parquet", ".pq"))]
     keep_inputs([], [robot, plant], files, out, report, gif)
-    from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked_with_margins
+    from omnidyn.control.circumstances import Circumstances
+    from omnidyn.control.closed_loop import told_of_loop, tracked_with_margins
     from omnidyn.control.controllers import several
     from omnidyn.control.instruments import instruments
     from omnidyn.control.readings import with_sensors

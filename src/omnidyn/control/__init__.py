@@ -5,6 +5,6 @@ of a robot), feedforward (the inverse model: volts for a motion; as a few number
 volts out; its gains: pole_placement), pid (pose in, volts out; for many robots pid_batch), mpc/ (the same, looking
 ahead), policy (a network). What they know of the robot and its loop: instruments, readings (what these show),
 without_slip, pose_estimator, filtered_twist, pose_gate, swing. controllers: all of them by name. closed_loop (a
-controller and a simulated robot, step by step; its result: tracking; margins beside it), tune (gains from such runs, some with
-pushes), first_runs (whatever the compiler is needed for).
+controller and a simulated robot, step by step; under what: circumstances; its result: tracking; margins beside it),
+tune (gains from such runs, some with pushes), first_runs (whatever the compiler is needed for).
 """

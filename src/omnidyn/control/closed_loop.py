@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Unpack
 
 import numpy as np
 
-from omnidyn.arguments import check_order, seed_of, unknown_option
+from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
+from omnidyn.control.circumstances import Circumstances, LoopOptions, circumstances
 from omnidyn.control.controller import OK, Controller
 from omnidyn.control.controllers import ControllerFile, controller_named, told_apart
-from omnidyn.control.feedforward import DT, check_dt
-from omnidyn.control.instruments import MOST_JITTER, Instruments, instruments
+from omnidyn.control.instruments import instruments
 from omnidyn.control.margins import loop_margins
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
@@ -28,79 +28,9 @@ from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run
 from omnidyn.simulation.live import LiveRobot, check_supply
 
-SKIP = 0.5  # [s] from the start that count as no error: the robot starts at rest
-MOST_STEPS = 1_000_000
-MOST_DELAY = 100
 STEPS_OF_REPORT = 64  # from one report of progress to the next
 # What a noise of 1 m/s on the speeds is on the others: x, y [m], heading [rad], v_x, v_y [m/s], omega [rad/s].
 NOISE = np.array([0.2, 0.2, 0.4, 1.0, 1.0, 4.0])
-Push = tuple[float, float, float]
-OPTIONS = ("dt", "duration", "skip", "noise", "delay", "rng", "push", "supply", "sensors")  # of `track`
-
-
-@dataclass(frozen=True)
-class Circumstances:
-    """Under what a robot is driven. dt [s]; duration [s], None: that of the path; skip [s]: no errors before it.
-
-    noise [m/s]: std of the measured speeds; of omega 4 times as many rad/s, of x and y 0.2 s, of the heading 0.4 s
-    times, where no encoder counts. delay: steps until an output acts. push: wrench on the body [N, N, N m], or what it
-    is at a time [s]. seed: of the noise, and of what instruments draw. supply [V]: behind a duty. sensors: with which
-    the robot is measured, None: those of its file.
-    """
-
-    dt: float = DT
-    duration: float | None = None
-    skip: float = SKIP
-    noise: float = 0.0
-    delay: int = 0
-    seed: int = 0
-    push: Push | Callable[[float], Push] = (0.0, 0.0, 0.0)
-    supply: float | None = None
-    sensors: Instruments | None = None
-
-    def __post_init__(self) -> None:
-        check_dt(self.dt)
-        for name, low, high in (("noise", 0.0, 100.0), ("delay", 0, MOST_DELAY), ("skip", 0.0, 1e6)):
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise InputError("out of range", got=value, expected=f"{low:g} to {high:g}", where=name)
-        if self.sensors is not None and not self.sensors.jitter <= MOST_JITTER * self.dt:
-            raise InputError(
-                "the jitter is no part of a step",
-                got=f"{self.sensors.jitter:g} s",
-                expected=f"at most {MOST_JITTER * self.dt:g} s, half of dt",
-                where="sensors",
-            )
-        if self.duration is not None and not self.dt <= self.duration <= MOST_STEPS * self.dt:
-            raise InputError(
-                "cannot track for that long",
-                got=self.duration,
-                expected=f"one step, {self.dt:g} s, to a million of them",
-                where="duration",
-            )
-
-    def steps(self, path: Path) -> int:
-        """How many steps it takes. Raises InputError for a path of too many."""
-        duration = path.duration if self.duration is None else self.duration
-        count = max(1, round(duration / self.dt))
-        if count > MOST_STEPS:
-            raise InputError("too many steps", got=count, expected=f"at most {MOST_STEPS}", remedy="set a `duration`")
-        return count
-
-
-def circumstances(plant: Robot, allowed: Sequence[str] = OPTIONS, **options: Any) -> Circumstances:
-    """Circumstances by name, as `track` takes them: `rng` gives the seed, `sensors` may be words.
-
-    Raises InputError for a name that is not allowed, or a number out of range.
-    """
-    for name in options:
-        if name not in allowed:
-            raise unknown_option("a closed loop", name, allowed, "track")
-    delay, kit = options.get("delay", 0), instruments(options.pop("sensors", None), plant)
-    if not 0 <= delay <= MOST_DELAY or delay != int(delay):
-        raise InputError("no delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
-    options |= {"delay": int(delay), "seed": seed_of(options.pop("rng", 0))}
-    return Circumstances(**options, sensors=kit)
 
 
 def track(
@@ -110,7 +40,7 @@ def track(
     *,
     plant: Robot | None = None,
     progress: Progress = silent,
-    **options: Any,
+    **options: Unpack[LoopOptions],
 ) -> Tracking:
     """Drive a simulated robot along a path with a controller, and see how near it comes; or with several, one by one.
 

@@ -1,21 +1,21 @@
 """Margins: how much later its outputs may act, and how much stronger, before a loop no longer settles.
 
-A simulated robot slides along at a steady twist, a fifth too slow at first, and the loop is to take it there: it settles
-where its speeds scatter by no more than SETTLED after `SECONDS`. Both margins are found by halving: of an additional
-latency, and of a factor on all outputs. Sliding, no friction changes its direction: what settles here is the loop
-itself, whatever the controller is made of, with the sensors of the robot but without their noise.
+A simulated robot slides along at a steady twist, a fifth too slow at first, and the loop is to take it there: it
+settles where its speeds scatter by no more than SETTLED after `SECONDS`. Both margins are found by halving: of an
+additional latency, and of a factor on all outputs. Sliding, no friction changes its direction: what settles here is the
+loop itself, whatever the controller is made of, with the sensors of the robot but without their noise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
+from omnidyn.control.circumstances import Circumstances
 from omnidyn.control.controller import Controller
 from omnidyn.control.instruments import Instruments
 from omnidyn.control.paths.motion import Path, Reference
@@ -32,19 +32,6 @@ END = 0.25  # of it
 SETTLED = 0.02  # of the speeds: so little they scatter in the end
 SLOWER = 0.8  # times the speed of the path, at first
 SHARES = np.array([0.25, 0.15, 0.2])  # of the top speeds: that of the path
-
-
-class LoopConditions(Protocol):
-    """Of the loop: time between two steps [s], steps until an output acts, volts behind a duty, and what measures it."""
-
-    @property
-    def dt(self) -> float: ...
-    @property
-    def delay(self) -> int: ...
-    @property
-    def supply(self) -> float | None: ...
-    @property
-    def sensors(self) -> Instruments | None: ...
 
 
 @dataclass(frozen=True)
@@ -77,7 +64,7 @@ class _SteadyTwist(Path):
         return Reference(place, velocity, change)
 
 
-def loop_margins(plant: Robot, controller: Controller, around: LoopConditions) -> Margins:
+def loop_margins(plant: Robot, controller: Controller, around: Circumstances) -> Margins:
     """The margins of a controller that drives a robot; it begins anew, and forgets all steps in the end."""
     speeds = SHARES * top_speeds(plant)
     if not (np.isfinite(speeds) & (speeds > 0.0)).all():
@@ -97,7 +84,7 @@ def loop_margins(plant: Robot, controller: Controller, around: LoopConditions) -
     return Margins(delay, gain)
 
 
-def has_delay_margin(plant: Robot, controller: Controller, around: LoopConditions, delay: float) -> bool:
+def has_delay_margin(plant: Robot, controller: Controller, around: Circumstances, delay: float) -> bool:
     """Whether a loop still settles where its outputs act so much later [s]."""
     speeds = SHARES * top_speeds(plant)
     later = plant.replace(drive=plant.drive.replace(latency=plant.drive.latency + delay))
@@ -118,7 +105,7 @@ def _largest(settles: Callable[[float], bool]) -> float:
     return low
 
 
-def _settles(plant: Robot, controller: Controller, around: LoopConditions, speeds: FloatArray, gain: float) -> bool:
+def _settles(plant: Robot, controller: Controller, around: Circumstances, speeds: FloatArray, gain: float) -> bool:
     """Whether a loop does, its outputs so many times as strong."""
     path, dt, kit = _SteadyTwist(speeds), around.dt, around.sensors or Instruments(plant.sensor_model)
     still = kit.sensors.replace(

@@ -251,7 +251,7 @@ class Pid(Guarded):
 
 
 def summed(total: float, more: float, weight: float) -> float:
-    """A sum of errors and one more: raised by its weight, lowered by all of it, but by what is less than 1 not beyond 0."""
+    """A sum of errors and one more: raised by its weight, lowered by all of it, a weight below 1 not beyond 0."""
     if more * total >= 0.0:
         return total + weight * more
     lowered = total + more

@@ -38,7 +38,10 @@ class PidBatch:
         off[:, 2] -= 2.0 * math.pi * np.round(off[:, 2] / (2.0 * math.pi))
         aim = pid.aim(off, pose[:, 2], twist, motion.velocity)
         place, turn = pid.farthest
-        place, turn = place / np.maximum(place, np.sum(off[:, :2] ** 2, axis=1)), turn / np.maximum(turn, off[:, 2] ** 2)
+        place, turn = (
+            place / np.maximum(place, np.sum(off[:, :2] ** 2, axis=1)),
+            turn / np.maximum(turn, off[:, 2] ** 2),
+        )
         raised_sum = summed_each(self._sum, off * dt, np.stack([place, place, turn], axis=1))
         raised, kept = pid.effort(aim, raised_sum), pid.effort(aim, self._sum)
         met = np.logical_or(*volts.beyond(raised))[:, None]

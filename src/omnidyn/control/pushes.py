@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.control.closed_loop import Push
+from omnidyn.control.circumstances import Push
 from omnidyn.model.drive import SPEED
 from omnidyn.model.inverse import inverse
 from omnidyn.model.robot import Robot

@@ -30,7 +30,8 @@ class Tracking(Displayable):
     controller, plant, path: their names. run: what the robot did. wanted: poses of the path at the times of the run,
     shape (samples, 3). skip [s]: errors before it count for nothing. dt [s]: between two steps.
     saturated_share: of the steps, those with an output at its limit. step_times [s]: of the controller, shape (steps,).
-    margins: by how much outputs may be later and stronger. statuses: word of `info.status` other than "ok" -> number of steps. sensors: with which the robot was measured.
+    margins: by how much outputs may be later and stronger. statuses: word of `info.status` other
+    than "ok" -> number of steps. sensors: with which the robot was measured.
     others: of the other controllers; numbers are those of this one, `best` is the nearest of all, and summary, document
     and plot are of all of them, side by side.
     """
@@ -217,7 +218,7 @@ def trackings_document(trackings: Sequence[Tracking], notes: Sequence[Statement]
         Table(columns, rows, "<>", name="controllers"),
         "",
         "position, heading: rmse; effort: rms of a voltage; change: its mean change from step to step.",
-        "delay, gain: how much later outputs may act, and how many times as strong be, before the loop no longer settles.",
+        "delay, gain: how much later outputs may act, and how many times as strong, before the loop no longer settles.",
     ]
     parts += [Points(notes, "-", "path")] if notes else []
     parts.append(by_severity(warnings, "warnings"))

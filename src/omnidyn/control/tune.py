@@ -18,12 +18,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.control.closed_loop import Circumstances, circumstances, told_of_loop, tracked
+from omnidyn.control.circumstances import Circumstances, TuneOptions, circumstances
+from omnidyn.control.closed_loop import told_of_loop, tracked
 from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
 from omnidyn.control.demand import path_demand
 from omnidyn.control.instruments import Instruments, instruments
@@ -45,7 +46,6 @@ from omnidyn.progress import Progress, Report, silent
 from omnidyn.shown import Displayable
 from omnidyn.statement import NOTE, Statement, as_verdict
 
-LOOP = ("dt", "duration", "noise", "delay", "rng", "sensors")  # options of the loop
 DRAWS, EVALUATIONS, NOISE = 3, 30, 0.005
 MOST_DRAWS, MOST_EVALUATIONS = 1000, 10_000
 FACTORS, FARTHEST = (4.0, 2.0), 16.0  # by which a setting is changed, round by round; and from the start at the most
@@ -95,7 +95,8 @@ class Tuned(Displayable):
     before, after: of these and of those chosen, over robots, noise, pushes and paths that the search has not seen;
     tried: of the best of the search there. own_before, own_after: on the robot of the file itself.
     draws: robots the search drove; uncertain: whether the file says how far its numbers may be off: else they are near
-    it. margins: of the loop with the gains chosen. evaluations: gains that were tried. noise [m/s], delay [steps], dt [s], sensors: of the loops.
+    it. margins: of the loop with the gains chosen. evaluations: gains that were tried. noise [m/s], delay
+    [steps], dt [s], sensors: of the loops.
     """
 
     robot: str
@@ -221,7 +222,7 @@ def tune(
     draws: int = DRAWS,
     evaluations: int = EVALUATIONS,
     progress: Progress = silent,
-    **options: Any,
+    **options: Unpack[TuneOptions],
 ) -> Tuned:
     """Find the settings of a controller by simulation, over the robots that the file says may be meant.
 
@@ -251,7 +252,7 @@ def tune(
     check_order("tune(robot, path, controller)", (robot, Robot), (paths, kinds), (controller, str))
     _check_counts(draws, evaluations, path is None or paths)
     seconds = options.get("duration", SECONDS if path is None else None)
-    around = circumstances(robot, LOOP, **{"noise": NOISE, **options, "duration": seconds})
+    around = circumstances(robot, (*TuneOptions.__annotations__,), **{"noise": NOISE, **options, "duration": seconds})
     around = replace(around, skip=min(SKIP, 0.5 * (seconds or SECONDS)))
     kit, seed = around.sensors or instruments(None, robot), around.seed
     robot = with_sensors(robot, options.get("sensors"))

@@ -34,7 +34,7 @@ KINDS = {
         "omnidyn.export.feedforward.wpilib", "wpilib", "kS, kV, kA as constants in Java, C++ and Python"
     ),
     "road-runner": ExportKind("omnidyn.export.feedforward.road_runner", "road_runner", "kS, kV, kA for Road Runner"),
-    "gains": ExportKind("omnidyn.export.feedforward.gains", "gains_csv", "kS, kV, kA with standard errors as CSV"),
+    "gains": ExportKind("omnidyn.export.feedforward.gains_csv", "gains_csv", "kS, kV, kA with standard errors as CSV"),
     "mjcf": ExportKind("omnidyn.export.bodies.mjcf", "mjcf", "a MuJoCo model, motors in volts"),
     "urdf": ExportKind("omnidyn.export.bodies.urdf", "urdf", "base and wheels as links and joints, for ROS"),
     "sdf": ExportKind("omnidyn.export.bodies.sdf", "sdf", "base and wheels as links and joints, for Gazebo"),

@@ -17,7 +17,7 @@ from omnidyn.identification.methods import (
     OutputError,
     SteadyState,
 )
-from omnidyn.identification.steady.operating_points import why_no_transient
+from omnidyn.identification.steady.loop_speed import why_no_transient
 from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
 from omnidyn.model.robot import MEASURED, Prior, Robot
 from omnidyn.progress import Progress, Report
@@ -69,7 +69,7 @@ def default_motor_method(runs: Sequence[Run], input: str, progress: Progress) ->
     line.
     """
     from omnidyn.identification.motors.fit import FREE_RUN_INPUTS  # imported lazily: slow to load
-    from omnidyn.identification.motors.start import SLOW_ROW
+    from omnidyn.identification.motors.points import SLOW_ROW
 
     kind = input or motor_input(runs, MOTOR_INPUTS)
     step = max((usual_step(run.t) for run in runs), default=0.0)

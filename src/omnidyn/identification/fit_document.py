@@ -11,7 +11,7 @@ from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.log_verdicts import checked
 from omnidyn.identification.methods import OUTPUT_ERROR
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.steady.study_table import Difference
+from omnidyn.identification.steady.group_numbers import Difference
 from omnidyn.identification.validation import Validation
 from omnidyn.model.actuation import DEAD_BAND
 from omnidyn.model.keys import in_words, unit

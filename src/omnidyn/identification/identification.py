@@ -21,7 +21,8 @@ from omnidyn.identification.methods import (
 )
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.fit import ALL_LOGS
-from omnidyn.identification.steady.study_table import Difference, SteadyStudy
+from omnidyn.identification.steady.group_numbers import Difference
+from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.identification.validation import Validation
 from omnidyn.identification.verdict import (
     fit_failure,

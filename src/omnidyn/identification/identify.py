@@ -38,7 +38,8 @@ from omnidyn.identification.methods import (
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import ALL_LOGS, Fit
 from omnidyn.identification.output_error.solve.progress import FitProgress
-from omnidyn.identification.steady.steady_state import fit_steady_state, identify_lines
+from omnidyn.identification.steady.paper_lines import identify_lines
+from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.identification.steady.study import diagnosed, fit_steady, undiagnosed
 from omnidyn.identification.validation import validate
 from omnidyn.identification.verdict import of_group

@@ -19,6 +19,7 @@ from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.run_file import columns_of, refuse_other_units
 from omnidyn.logs.table.table import FileTable
+from omnidyn.statement import Statement
 
 MAX_STEPS = 10_000_000
 KINDS = ("voltage", "duty", "wheel_speed_command", "twist_command")
@@ -39,7 +40,7 @@ class HeldCommands:
     t0: float
     sha256: str
     supply: FloatArray | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Statement | str, ...] = ()
 
     @property
     def voltage(self) -> FloatArray:

@@ -19,6 +19,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.table.table import FileTable
+from omnidyn.statement import Statement
 
 # column -> (kind, unit, size of one in that unit)
 _INPUTS: dict[str, tuple[str, str, float]] = {
@@ -65,7 +66,7 @@ class MotorTable:
     run: IntArray | None = None
     source: str = ""
     sha256: str = ""
-    notes: tuple[str, ...] = ()
+    notes: tuple[Statement | str, ...] = ()
 
     def __post_init__(self) -> None:
         lengths = {len(self.put_in), len(self.speed), len(self.motor)}

@@ -15,9 +15,9 @@ class LogFile:
     """A log, how it is read, and what check says of it.
 
     name: that a page shows. path: of the file. map: of its columns, "" for a guess. result: of the job; error: why
-    there is none. series: id of its signals. progress: in words, while it is read. other: key of a log that is drawn
-    over it, with offset added to its times [s]; aligned: what the library says of that. stem: of the names of files
-    that are made of it.
+    there is none; ended: whether its process ended before. series: id of its signals. progress: in words, while it is
+    read. other: key of a log that is drawn over it, with offset added to its times [s]; aligned: what the library says
+    of that. stem: of the names of files that are made of it.
     """
 
     key: str
@@ -27,6 +27,7 @@ class LogFile:
     unsigned: bool = False
     result: dict[str, Any] | None = None
     error: str = ""
+    ended: bool = False
     series: str = ""
     progress: str = ""
     version: int = 0

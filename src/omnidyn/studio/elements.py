@@ -7,6 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
+from omnidyn.document import in_clauses
 from omnidyn.logs.channels import components
 from omnidyn.run import CHANNELS
 
@@ -15,9 +16,17 @@ MARK = {"error": "✕", "warning": "!", "note": "i"}
 
 
 def verdict(severity: str, words: str, name: str = "verdict") -> None:
+    """What a result says: one line, then what it rests on as a list."""
+    line, clauses = in_clauses(words)
     with ui.row().classes(f"verdict {severity}").props(f"id={name} role=status"):
         ui.label(MARK[severity]).classes("mark")
-        ui.label(words).classes("text")
+        with ui.column().classes("words"):
+            ui.label(line).classes("text strong")
+            if clauses:
+                with ui.element("ul"):
+                    for clause in clauses:
+                        with ui.element("li"):
+                            ui.label(clause).classes("text")
 
 
 def table(table: dict[str, Any], name: str) -> None:
@@ -30,8 +39,9 @@ def table(table: dict[str, Any], name: str) -> None:
         with ui.element("tbody"):
             for row in table["rows"]:
                 with ui.element("tr"):
-                    for cell in row:
-                        with ui.element("td"):
+                    for head, cell in zip(table["head"], row, strict=False):
+                        with ui.element("td") as field:  # narrow pages show a row as a card: each cell with its head
+                            field._props |= {"data-head": head, **({} if str(cell) else {"data-empty": ""})}
                             ui.label(cell)
 
 

@@ -1,7 +1,8 @@
 """Guard: one place through which pages, files and sockets go. Foreign pages and foreign names get nothing.
 
 A page of another site may send requests to this machine, and a name of another site may point to it (DNS rebinding).
-The first is told by `Origin`, which a page cannot set, the second by `Host`, which has to be a name of this machine.
+The first is told by `Origin` and `Sec-Fetch-Site`, which a page cannot set, the second by `Host`, which has to be a
+name of this machine.
 Any port is fine, so that a forwarded one (`ssh -L`) works.
 """
 
@@ -33,6 +34,7 @@ HEADERS = (
         b"default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; frame-ancestors 'none'",
     ),
 )
+OWN = ("same-origin", "none")  # `Sec-Fetch-Site` of a page of this server, and of an address that somebody typed
 _HOST = re.compile(r"(?P<name>[a-z0-9.-]+|\[[0-9a-f:.]+\])(?::\d{1,5})?", re.ASCII)
 
 
@@ -64,7 +66,7 @@ class Guard:
         if len(origins) != 1 and not (asks_only and not origins):  # a browser always says it of the others
             return False
         pages = (f"http://{hosts[0]}".lower(), f"https://{hosts[0]}".lower())
-        if any(origin.lower() not in pages for origin in origins):
+        if any(origin.lower() not in pages for origin in origins) or _is_foreign(scope):
             return False
         return not self.token or self._knows_token(scope)
 
@@ -116,6 +118,14 @@ class Guard:
         except RuntimeError:  # of the toolkit, where nobody waits for the answer any more
             if not gone:
                 raise
+
+
+def _is_foreign(scope: Scope) -> bool:
+    """Whether a page of another site asks, as its browser says; one that links to the first page may."""
+    sites = _values(scope, b"sec-fetch-site")
+    kind = (*_values(scope, b"sec-fetch-mode"), *_values(scope, b"sec-fetch-dest"))
+    followed = kind == ("navigate", "document") and scope["path"] == "/" and scope.get("method") == "GET"
+    return any(site not in OWN for site in sites) and not followed
 
 
 def is_loopback(host: str) -> bool:

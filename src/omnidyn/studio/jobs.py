@@ -21,6 +21,7 @@ from omnidyn.studio.drive.job import drive
 from omnidyn.studio.fit.job import fit, free_keys, warm
 from omnidyn.studio.job import Tell
 from omnidyn.studio.log.job import align, check, example, save_columns
+from omnidyn.studio.robot.job import check_robot
 from omnidyn.studio.track.job import track
 from omnidyn.studio.worker import Listener
 
@@ -32,6 +33,7 @@ JOBS: dict[str, Callable[[Mapping[str, Any], Tell, Any], dict[str, Any]]] = {
     "warm": warm,
     "free_keys": free_keys,
     "example": example,
+    "check_robot": check_robot,
     "drive": drive,
     "track": track,
     "compare": compare,

@@ -19,7 +19,10 @@ from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.fit.tab import FitTab
 from omnidyn.studio.log.tab import LogTab
 from omnidyn.studio.page import Page
+from omnidyn.studio.parts import FIT, LOGS, PROGRESS, ROBOT
+from omnidyn.studio.robot.tab import RobotTab
 from omnidyn.studio.session import Session
+from omnidyn.studio.steps import MARKS, StepState, following, steps
 from omnidyn.studio.track.state import Tracks
 from omnidyn.studio.track.tab import TrackTab
 
@@ -27,6 +30,11 @@ HEAD = """
 <link rel="stylesheet" href="/static/studio.css">
 <script type="module" src="/static/studio.js"></script>
 """
+
+
+TAB = "tab"  # of an address: the tab that is shown
+WATCH = f"""addEventListener('popstate', () =>
+    emitEvent('{TAB}', new URLSearchParams(location.search).get('{TAB}') || ''));"""
 
 
 class Studio:
@@ -56,10 +64,15 @@ class Studio:
         await asyncio.to_thread(workspace.write, space, path)
         return path
 
+    def line(self) -> list[StepState]:
+        """Where each step stands."""
+        return steps(self.session, self.fitting.last, self.fitting.why_not()[0])
+
     def tabs(self, page: Page) -> dict[str, Any]:
         """The tabs of a page, by name."""
         return {
             "Log": LogTab(page),
+            "Robot": RobotTab(page),
             "Fit": FitTab(page, self.fitting),
             "Drive": DriveTab(page, self.driving),
             "Track": TrackTab(page, self.tracks),
@@ -67,14 +80,14 @@ class Studio:
         }
 
 
-def show(studio: Studio) -> None:
-    """Lay out a page."""
+def show(studio: Studio, tab: str = "") -> None:
+    """Lay out a page. tab: that is shown first."""
     ui.add_head_html(HEAD)
     ui.colors(primary="#0b57a4")
     # What moves between press and release of the mouse loses the click: a list is there at once, with all its rows
     ui.select.default_props("transition-duration=0 virtual-scroll-slice-size=200")
     session, client = studio.session, ui.context.client
-    page = Page(session)
+    page = Page(session, studio.line)
     tabs = studio.tabs(page)
     session.listeners.add(page.changed)
     client.on_delete(lambda: _forget(session, page))
@@ -82,20 +95,58 @@ def show(studio: Studio) -> None:
     with ui.header().classes("bar"):
         with ui.element("h1").classes("brand"):
             ui.label("omnidyn studio")
-        with ui.tabs().props("dense no-caps inline-label") as page.tabs:
-            for name in tabs:
-                ui.tab(name)
+        with ui.tabs().props("dense no-caps outside-arrows mobile-arrows") as page.tabs:
+            marks = {name: _tab(name) for name in tabs}
         ui.space()
         ui.button("◐", on_click=lambda: dark.set_value(not dark.value)).props("flat dense aria-label='light or dark'")
-    with ui.tab_panels(page.tabs, value=next(iter(tabs)), animated=False).classes("panels"):
-        for name, tab in tabs.items():
+
+    def line() -> None:
+        """Where each step stands, on its tab, and what to do next."""
+        all_steps = studio.line()
+        for step in all_steps:
+            mark, words = marks[step.name]
+            mark.set_text(MARKS[step.state])
+            words.set_text(step.words)
+            for label, name in ((mark, "state"), (words, "state more")):
+                label.classes(replace=f"{name} {step.state}")
+        if after := following(all_steps):
+            with ui.row().classes("line next").props("role=status id=next"):
+                ui.label(f"Next: {after.next}.").classes("text")
+
+    page.part(line, LOGS, PROGRESS, ROBOT, FIT)
+    first = next((name for name in tabs if name.lower() == tab.lower()), next(iter(tabs)))
+    with ui.tab_panels(page.tabs, value=first, animated=False).classes("panels"):
+        for name, part in tabs.items():
             with ui.tab_panel(name):
-                tab.build()
+                part.build()
+    _keep_address(page)
     with ui.row().classes("line foot"):
         ui.link("Save the workspace", "/workspace").props("download")
         words = "All logs, maps, robots and fits as one file. To open it: drop it on the tab Log, or"
         ui.label(words).classes("text quiet")
         ui.label(f"omnidyn studio {workspace.FILE_NAME}").classes("code")
+
+
+def _tab(name: str) -> tuple[ui.label, ui.label]:
+    """A tab; the labels on it that say how far its step is: a mark, and words."""
+    with ui.tab(name), ui.row().classes("gap-1 no-wrap").props("aria-hidden=true"):
+        return ui.label(), ui.label()
+
+
+def _keep_address(page: Page) -> None:
+    """Let the address name the tab, so that a reload and "back" find it."""
+    assert page.tabs is not None
+
+    def push(name: str) -> None:
+        tab = name.lower()
+        ui.run_javascript(
+            f"const u = new URL(location); if ((u.searchParams.get('{TAB}') || 'log') !== '{tab}') "
+            f"{{ u.searchParams.set('{TAB}', '{tab}'); history.pushState(null, '', u); }}"
+        )
+
+    page.tabs.on_value_change(lambda event: push(str(event.value)))
+    ui.add_body_html(f"<script>{WATCH}</script>")
+    ui.on(TAB, lambda event: page.go(str(event.args).capitalize() or "Log"))
 
 
 def _forget(session: Session, page: Page) -> None:

@@ -3,21 +3,33 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from nicegui import ui
 
+from omnidyn.studio.elements import verdict
+from omnidyn.studio.parts import FIT, LOGS, ROBOT
 from omnidyn.studio.session import Session
+from omnidyn.studio.steps import DONE, StepState
 from omnidyn.studio.task import Task, progress_of
-from omnidyn.studio.worker import Worker
+
+STEPS = (  # what a newcomer does: title, and words
+    ("1. Log", "Drop a recording of your robot: CSV, Parquet, a ROS bag, MATLAB, WPILOG. It stays on this machine."),
+    ("2. Robot", "Choose a robot file, or describe where its wheels stand and what it weighs."),
+    ("3. Fit", "Friction and motor numbers with intervals, as a robot file to drive, track and compare with."),
+)
 
 
 class Page:
     """One browser tab. parts: what is made again when a part of the session changes."""
 
-    def __init__(self, session: Session) -> None:
-        self.session = session
+    def __init__(self, session: Session, line: Callable[[], list[StepState]]) -> None:
+        self.session, self.line, self.client = session, line, ui.context.client
+        # part -> label of a choice -> what lets it follow another page
+        self.mirrors: dict[str, dict[str, Callable[[], None]]] = {}
+        self.stale = set[str]()  # parts that changed while nobody was connected
+        self.client.on_connect(self.catch_up)
         self.parts: dict[str, list[Any]] = {}
         self.tabs: ui.tabs | None = None
         self.folded: dict[str, bool] = {}  # title -> whether it is open
@@ -28,9 +40,51 @@ class Page:
         self.tabs.set_value(name)
 
     def changed(self, part: str) -> None:
-        """Show a part anew."""
-        for refresh in self.parts.get(part, ()):
+        """Show a part anew: at once, or when somebody is connected again."""
+        if not self.client.has_socket_connection:
+            self.stale.add(part)
+            return
+        for refresh in (*self.parts.get(part, ()), *self.mirrors.get(part, {}).values()):
             refresh()
+
+    def catch_up(self) -> None:
+        """Show what changed while nobody was connected."""
+        parts, self.stale = self.stale, set()
+        for part in parts:
+            self.changed(part)
+
+    def next_step(self, name: str) -> None:
+        """What comes after this tab, as its one primary button; on a tab that is not done, what is missing."""
+
+        def show() -> None:
+            line = self.line()
+            places = {step.name: k for k, step in enumerate(line)}
+            if line[places[name]].state != DONE:
+                return
+            after = next(step for step in line[places[name] + 1 :] if step.state != DONE)
+            with ui.row().classes("line"):
+                ui.button(f"Next: {after.name}", on_click=lambda: self.go(after.name)).props(
+                    f"unelevated no-caps id=next-{name.lower()}"
+                )
+
+        self.part(show, LOGS, ROBOT, FIT)
+
+    def empty(self, name: str) -> None:
+        """The three steps, and a picture, where this tab has nothing to show yet."""
+
+        def show() -> None:
+            line = self.line()
+            if all(step.state == DONE for step in line[: 1 if name == "Log" else 2]):
+                return
+            with ui.element("div").classes("empty"):
+                ui.image("/static/steps.svg").props("alt='A robot seen from above, its log, and the fitted curve'")
+                with ui.element("ol"):
+                    for step, words in zip(line, STEPS, strict=False):
+                        with ui.element("li").classes(step.state):
+                            ui.label(f"{words[0]} ({step.words})").classes("strong")
+                            ui.label(words[1]).classes("quiet")
+
+        self.part(show, LOGS, ROBOT, FIT)
 
     def part(self, make: Callable[[], None], *parts: str) -> None:
         """A piece of the page that is made again when one of these parts of the session changes."""
@@ -39,6 +93,18 @@ class Page:
         for part in parts:
             self.parts.setdefault(part, []).append(shown.refresh)
 
+    def mirror(self, choice: Any, part: str, get: Callable[[], Any], name: str = "") -> None:
+        """Let a choice show what another page chose when a part changes; it is not made again: it may be open.
+
+        name: of the choice on this page; its label by default.
+        """
+
+        def follow() -> None:
+            if not choice.is_deleted and choice.value != get():
+                choice.set_value(get())
+
+        self.mirrors.setdefault(part, {})[name or choice.props["label"]] = follow
+
     def box(self, title: str, is_open: bool = False) -> ui.expansion:
         """A part that can be folded; it stays as it was when it is made again."""
         name = title.partition(" (")[0]
@@ -46,7 +112,36 @@ class Page:
         box = ui.expansion(title, value=is_open, on_value_change=lambda event: self.folded.update({name: event.value}))
         return box.classes("box")
 
-    def progress(self, part: str, task: Callable[[], Task], worker: Worker) -> None:
+    def stopped(self, task: Task, name: str, again: Callable[[], Any]) -> None:
+        """Why a task has no result, and a button that begins it again where nothing else is to be done.
+
+        name: of the verdict's id. again: makes what does the task again.
+        """
+        if task.error:
+            verdict("error", task.error, name)
+        elif task.stopped:
+            verdict("warning", "Cancelled: there is no result.", f"{name}-cancelled")
+        if task.stopped:
+            ui.button("Run again", on_click=lambda: self.session.start(again())).props(
+                f"outline no-caps id={name}-again"
+            )
+
+    def busy(self, work: Callable[[], Awaitable[Any]], trouble: ui.label | None = None) -> Callable[[Any], Any]:
+        """What a button does, which shows that it works until the work is done. trouble: shows what it returns."""
+
+        async def act(event: Any) -> None:
+            button = event.sender.props("loading")
+            words = await work()
+            if not button.is_deleted:  # the part may have been made again
+                button.props(remove="loading")
+            if trouble is not None and not trouble.is_deleted:
+                trouble.text = words
+            elif words:
+                ui.notify(words, type="negative", timeout=0, close_button="Close")
+
+        return act
+
+    def progress(self, part: str, task: Callable[[], Task], worker: str) -> None:
         """How far the task of a part is, and a button that cancels it.
 
         The button stays the same while the words beside it change: a click takes longer than they stand.
@@ -57,14 +152,15 @@ class Page:
                 left = "" if task().left is None else f", about {task().left:.0f} s left"
                 with ui.row().classes("line"):
                     ui.spinner(size="1.2em")
-                    ui.label(task().progress).props(f"id={part}-progress")
+                    words = "cancelling" if task().cancelling else task().progress
+                    ui.label(words).props(f"id={part}-progress")
                     ui.label(f"{task().spent:.0f} s{left}").classes("quiet").props(f"id={part}-time")
 
         def button() -> None:
             if task().running:
-                ui.button("Cancel", on_click=lambda: self.session.start(worker.cancel())).props(
-                    f"outline dense no-caps id=cancel-{part}"
-                )
+                ui.button(
+                    "Cancel", on_click=lambda: self.session.start(task().cancel(self.session, part, worker))
+                ).props(f"outline dense no-caps id=cancel-{part}")
 
         def bar() -> None:
             share = task().share

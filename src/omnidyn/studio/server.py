@@ -113,7 +113,10 @@ def application(studio: Studio, files: list[str]) -> FastAPI:
     _add_files(app, studio)
     _add_sockets(app, studio)
 
-    ui.page("/", title="omnidyn studio")(lambda: show(studio))
+    @ui.page("/", title="omnidyn studio")
+    def page(tab: str = "") -> None:
+        show(studio, tab)
+
     ui.run_with(app, title="omnidyn studio", dark=None, show_welcome_message=False)
     return app
 

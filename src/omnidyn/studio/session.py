@@ -10,7 +10,9 @@ import asyncio
 import contextlib
 import inspect
 import itertools
+import json
 import re
+import shutil
 import sys
 import tempfile
 from collections.abc import AsyncIterator, Callable
@@ -18,11 +20,13 @@ from pathlib import Path
 from typing import Any
 
 import omnidyn
+from omnidyn.errors import InputError
+from omnidyn.model.presets import robot_path
 from omnidyn.progress import Report
 from omnidyn.studio.calls import LogFile
 from omnidyn.studio.parts import COMPARE, FIT, LOGS, PROGRESS, ROBOT, TRACK
 from omnidyn.studio.series import META, Series
-from omnidyn.studio.worker import CancelledError, JobError, Worker
+from omnidyn.studio.worker import CancelledError, EndedError, JobError, Worker
 
 MAX_FILES, MAX_FILE_BYTES, MAX_BYTES = 50, 2**30, 4 * 2**30  # of uploads
 ROBOT_SUFFIX = ".toml"
@@ -41,12 +45,13 @@ class Session:
         self.folder = Path(self._folder.name)
         self.logs: dict[str, LogFile] = {}
         self.robots = {name: name for name in omnidyn.preset_names()}  # shown name -> preset or path
+        self.presets = (*self.robots,)
         self.robot = ""
         self.series: dict[str, Series] = {}
         self.listeners: set[Callable[[str], None]] = set()
         self.workers = {name: Worker() for name in ("log", "fit", "drive", TRACK, COMPARE, "warm")}
         self.others = 0  # files that are neither logs nor robots
-        self.takers: dict[str, Callable[[str, str], object]] = {"": self.add_log, ROBOT_SUFFIX: self.add_robot}
+        self.takers: dict[str, Callable[[str, str], object]] = {"": self.add_log, ROBOT_SUFFIX: self.take_robot}
         self.count, self._bytes, self._tasks = 0, 0, set[asyncio.Task[Any]]()
 
     def changed(self, *parts: str) -> None:
@@ -130,6 +135,10 @@ class Session:
                 path.unlink(missing_ok=True)
         return safe
 
+    def without_paths(self, result: Any) -> Any:
+        """A result of a job, its words as pages show them."""
+        return json.loads(self.shown(json.dumps(result)))
+
     def make_room(self, count: int, size: int) -> None:
         """Count files that lie in the folder of the session [bytes]. Raises RefusedError for too many."""
         if len(self.logs) + len(self.robots) + self.others + count > MAX_FILES or self._bytes + size > MAX_BYTES:
@@ -141,8 +150,11 @@ class Session:
         return self.takers.get(kind, self.add_log)
 
     def shown(self, words: str) -> str:
-        """Words without the folders of uploads and results."""
-        return re.sub(rf"{re.escape(str(self.folder))}/(?:\d+/)+", "", words)
+        """Words without the folders of uploads, of results, and of files that the command line named."""
+        words = re.sub(rf"{re.escape(str(self.folder))}/(?:\d+/)+", "", words)
+        for path in (*(log.path for log in self.logs.values()), *self.robots.values()):
+            words = words.replace(path, Path(path).name)
+        return words
 
     def remove(self, log: LogFile) -> None:
         """Forget a log; one that was uploaded is deleted."""
@@ -153,20 +165,24 @@ class Session:
             path.unlink(missing_ok=True)
         self.changed(LOGS, FIT)
 
-    async def example(self) -> None:
-        """A simulated log to begin with."""
+    async def example(self) -> str:
+        """A simulated log to begin with; an error in words, or ""."""
         path = self.new_folder() / "example.csv"
-        await self.workers["log"].run("example", {"path": str(path)}, lambda kind, value: None)
+        try:
+            await self.workers["log"].ask("example", {"path": str(path)})
+        except (JobError, CancelledError) as error:
+            return str(error)
         self.robot = self.robot or "axebot"
         self.add_log(str(path), path.name)
         self.changed(ROBOT)
+        return ""
 
     async def check(self, log: LogFile) -> None:
         """Read and check a log again."""
         log.version += 1
         version = log.version
         folder = self.new_folder() / "series"
-        log.error, log.result, log.progress = "", None, str(Report(f"reading {log.label}"))
+        log.error, log.ended, log.result, log.progress = "", False, None, str(Report(f"reading {log.label}"))
         self.changed(LOGS, FIT)
 
         def listen(kind: str, value: Any) -> None:
@@ -179,11 +195,11 @@ class Session:
         try:
             result = await self.workers["log"].run("check", request, listen)
         except JobError as error:
-            result, log.error = None, str(error).replace(f"{Path(log.path).parent}/", "")
-        except CancelledError:
-            return
+            result, log.error, log.ended = None, self.shown(str(error)), isinstance(error, EndedError)
+        except CancelledError as error:
+            result, log.error, log.ended = None, str(error), True
         if version == log.version:
-            log.result, log.progress = result, ""
+            log.result, log.progress = self.without_paths(result), ""
             self.changed(LOGS, FIT)
 
     def _take_series(self, log: LogFile, folder: Path) -> None:
@@ -197,8 +213,8 @@ class Session:
         """Read a log by a table of columns; an error in words, or ""."""
         path = self.new_folder() / "columns.toml"
         try:
-            await self.workers["log"].run("save_columns", {"rows": rows, "path": str(path)}, lambda kind, value: None)
-        except JobError as error:
+            await self.workers["log"].ask("save_columns", {"rows": rows, "path": str(path)})
+        except (JobError, CancelledError) as error:
             return str(error)
         log.map = str(path)
         await self.check(log)
@@ -217,11 +233,9 @@ class Session:
         """Put the other log on the clock of a log, by what both recorded."""
         request = {"robot": self.robot_path, "logs": [one.request for one in (log, self.logs[log.other])]}
         try:
-            aligned = await self.workers["log"].run("align", request, lambda kind, value: None)
+            aligned = self.without_paths(await self.workers["log"].ask("align", request))
         except (JobError, CancelledError) as error:
-            aligned = {"severity": "error", "verdict": str(error)}
-        for one in (log, self.logs[log.other]):
-            aligned["verdict"] = aligned["verdict"].replace(one.path, one.label)
+            aligned = {"severity": "error", "verdict": self.shown(str(error))}
         log.aligned, log.offset = aligned, float(aligned.get("offset", log.offset))
         self.changed(LOGS)
 
@@ -242,10 +256,56 @@ class Session:
         """The preset or the path of the robot; "" for none."""
         return self.robots.get(self.robot, "")
 
+    def is_file(self, name: str) -> bool:
+        """Whether a robot is a file, not a preset."""
+        return self.robots.get(name, name) not in self.presets
+
+    def robot_text(self, name: str) -> str:
+        """The file of a robot."""
+        return Path(robot_path(self.robots[name])).read_text("utf-8", "replace")
+
     def add_robot(self, path: str, name: str) -> None:
-        """Take a robot file, and choose it."""
-        self.robots[name] = path
+        """Take a robot file, and choose it; logs are checked with it, also where one of this name was chosen before."""
+        self.robots[name], self.robot = path, ""
         self.choose(name)
+
+    async def take_robot(self, path: str, name: str, *, choose: bool = True) -> None:
+        """Take a copy of a robot file that was dropped. Raises InputError for what is none."""
+        try:
+            await self.workers["log"].ask("check_robot", {"path": path})
+        except (JobError, CancelledError) as error:
+            raise InputError(self.shown(str(error).removeprefix(f"{path}: "))) from None
+        kept = shutil.copyfile(path, self.new_folder() / name)
+        self._bytes += kept.stat().st_size
+        if choose:
+            self.add_robot(str(kept), name)
+        else:
+            self.robots[self.free_name(name)] = str(kept)
+            self.changed(ROBOT)
+
+    async def keep_robot(self, text: str, name: str, of: str) -> str:
+        """Keep a text as a robot file; an error in words, or "". of: the robot it was made of, which gets this name."""
+        name = f"{safe_name(name.removesuffix(ROBOT_SUFFIX))}{ROBOT_SUFFIX}"
+        if name != of and name in self.robots:
+            return str(InputError("there is a robot of this name", got=name, remedy="use another name"))
+        path = self.new_folder() / name
+        path.write_text(text, "utf-8")
+        before = of if name != of and self.is_file(of) else ""
+        try:
+            await self.take_robot(str(path), name)
+        except InputError as error:
+            return str(error)
+        if before:
+            self.robots.pop(before)
+            self.changed(ROBOT)
+        return ""
+
+    def remove_robot(self, name: str) -> None:
+        """Forget a robot file."""
+        self.robots.pop(name, None)
+        if self.robot == name:
+            self.robot = ""
+        self.changed(ROBOT, FIT)
 
     def free_name(self, name: str) -> str:
         """The name, or the next one that no robot has yet."""
@@ -270,9 +330,10 @@ class Session:
             stdout=asyncio.subprocess.DEVNULL,
             stderr=asyncio.subprocess.PIPE,
         )
-        _, words = await process.communicate()
+        _, said = await process.communicate()
         if process.returncode:
-            return words.decode("utf-8", "replace").strip().removeprefix("omnidyn: error: ")
+            words = said.decode("utf-8", "replace").strip().removeprefix("omnidyn: error: ")
+            return self.shown(words) or str(EndedError(process.returncode))
         self.add_robot(str(path), path.name)
         return ""
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from omnidyn.studio.series import Series
 from omnidyn.studio.session import Session
-from omnidyn.studio.worker import CancelledError, JobError
+from omnidyn.studio.worker import CancelledError, EndedError, JobError
 
 
 def progress_of(part: str) -> str:
@@ -21,12 +20,16 @@ def progress_of(part: str) -> str:
 class Task:
     """A job. result: of it; error: in words. folder: of its files. command, python: that do the same.
 
-    running, progress, share, spent, left [s]: while it goes on. series: of its signals, by the names of their folders.
+    stopped: whether it was cancelled, or its process ended, before there was a result. cancelling: whether that was
+    asked for. running, progress, share, spent, left [s]: while it goes on. series: of its signals, by the names of
+    their folders.
     """
 
     result: dict[str, Any] | None = None
     error: str = ""
     running: bool = False
+    stopped: bool = False
+    cancelling: bool = False
     progress: str = ""
     share: float | None = None
     spent: float = 0.0
@@ -43,7 +46,7 @@ class Task:
 
     async def run(self, session: Session, part: str, worker: str, job: str, request: dict[str, Any]) -> None:
         """Do a job in a worker. part: of the page that shows it. request: without the "folder" of the results."""
-        self.running, self.progress, self.folder = True, "...", session.new_folder() / job
+        self.running, self.progress, self.folder = True, "starting", session.new_folder() / job
         session.changed(part)
 
         def listen(kind: str, value: Any) -> None:
@@ -55,10 +58,17 @@ class Task:
             for name in result.get("series", ()):
                 self.series[name] = f"{job}{session.count}-{name}"
                 session.series[self.series[name]] = Series(self.folder / name)
-            self.result = json.loads(session.shown(json.dumps(result)))
+            self.result = session.without_paths(result)
         except JobError as error:
-            self.error = session.shown(str(error))
+            self.error, self.stopped = session.shown(str(error)), isinstance(error, EndedError)
         except CancelledError:
-            pass
-        self.running = False
-        session.changed(part)
+            self.stopped = True
+        finally:
+            self.running = False
+            session.changed(part)
+
+    async def cancel(self, session: Session, part: str, worker: str) -> None:
+        """Ask the job to end, and show at once that it was asked."""
+        self.cancelling = True
+        session.changed(progress_of(part))
+        await session.workers[worker].cancel()

@@ -9,9 +9,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import signal
 import sys
 from collections.abc import Callable
 from typing import Any
+
+from omnidyn.errors import OmnidynError
 
 Listener = Callable[[str, Any], None]
 GRACE = 20.0  # [s] that a job has to end after it was cancelled: the best so far may still be written
@@ -26,6 +29,15 @@ class JobError(Exception):
     """The job ended with an error, in words."""
 
 
+class EndedError(JobError):
+    """The process of the job ended before its result."""
+
+    def __init__(self, code: int) -> None:
+        got = f"signal {signal.Signals(-code).name}" if -code in {*signal.Signals} else f"exit code {code}"
+        remedy = "run it again; where it ends again, close other programs or use a shorter log: memory may be full"
+        super().__init__(str(OmnidynError("the process of this job ended before its result", got=got, remedy=remedy)))
+
+
 class Worker:
     """The server's side of a worker process, which starts with its first job."""
 
@@ -37,14 +49,33 @@ class Worker:
     async def run(self, job: str, request: Any, listen: Listener) -> Any:
         """The result of a job, when those before it are done. listen: gets each kind of message and what it holds.
 
-        Raises JobError with the words of an error, CancelledError for a job that was cancelled without a result.
+        Raises JobError with the words of an error, EndedError where the process ended, CancelledError for a job that
+        was cancelled without a result.
         """
         async with self._lock:
             self.busy, self._is_cancelled = True, False
             try:
-                return await self._result(await self._started(), job, request, listen)
+                before, heard = self._process, [False]
+
+                def hear(kind: str, value: Any) -> None:
+                    heard[0] = True
+                    listen(kind, value)
+
+                try:
+                    return await self._result(await self._started(), job, request, hear)
+                except EndedError:
+                    if self._process is not before or heard[0]:
+                        raise
+                return await self._result(await self._started(), job, request, listen)  # it had ended while it waited
             finally:
                 self.busy = False
+
+    async def ask(self, job: str, request: Any) -> Any:
+        """The result of a short job; it is done once more where its process ends. Raises as `run` does."""
+        try:
+            return await self.run(job, request, lambda kind, value: None)
+        except EndedError:
+            return await self.run(job, request, lambda kind, value: None)
 
     async def start(self) -> None:
         """Start the process: what it needs is loaded while nobody waits for it."""
@@ -52,7 +83,8 @@ class Worker:
             await self._started()
 
     async def _started(self) -> asyncio.subprocess.Process:
-        if self._process is None or self._process.returncode is not None:
+        process = self._process
+        if process is None or process.returncode is not None or (process.stdout and process.stdout.at_eof()):
             self._process = await asyncio.create_subprocess_exec(
                 sys.executable,
                 "-m",
@@ -62,19 +94,27 @@ class Worker:
                 limit=LINE_BYTES,
                 start_new_session=True,  # Ctrl-C at the terminal is for the server, which ends the worker
             )
-        return self._process
+            return self._process
+        return process
 
     async def _result(self, process: asyncio.subprocess.Process, job: str, request: Any, listen: Listener) -> Any:
         assert process.stdout is not None
         self.send({"job": job, "request": request})
         while line := await process.stdout.readline():
-            for kind, value in json.loads(line).items():
+            try:
+                message = json.loads(line)
+            except ValueError:  # cut short: the process ended while it wrote
+                break
+            for kind, value in message.items():
                 if kind == "result":
                     return value
                 if kind == "error":  # whatever an interrupt did to a job, it is the end that was asked for
                     raise (CancelledError if value is None or self._is_cancelled else JobError)(value)
                 listen(kind, value)
-        raise CancelledError
+        code = await process.wait()
+        if self._is_cancelled:
+            raise CancelledError
+        raise EndedError(code)
 
     def send(self, message: dict[str, Any]) -> None:
         """Send a message to the process, where it runs."""
@@ -94,6 +134,7 @@ class Worker:
             if not self.busy:
                 return
         if process is not None and process is self._process:
+            self._is_cancelled = True  # of whatever runs by now: what the job waited for was interrupted first
             await self.stop()
 
     async def stop(self) -> None:

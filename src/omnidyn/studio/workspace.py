@@ -21,6 +21,7 @@ from typing import Any
 
 from omnidyn.errors import InputError
 from omnidyn.files import open_regular
+from omnidyn.statement import ERROR, NOTE
 from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.session import MAX_BYTES, MAX_FILE_BYTES, MAX_FILES, Session, safe_name
 from omnidyn.studio.task import Task
@@ -238,6 +239,7 @@ def _fit(entry: Mapping[str, Any], files: Mapping[str, Path]) -> Task:
     shown = {
         "verdict": entry["verdict"],
         "failed": entry["failed"],
+        "severity": ERROR if entry["failed"] else NOTE,
         "interrupted": False,
         "numbers": _table(folder / FIT_FILES["numbers"]),
         "warnings": [dict(zip(warnings["head"], row, strict=True)) for row in warnings["rows"]],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from omnidyn.document import all_of, both, short
-from omnidyn.identification.steady.lack_of_fit import TURNED_DEG
+from omnidyn.identification.steady.unoffered_parts import TURNED_DEG
 from omnidyn.model.keys import BODY_AXES, DIRECTION, find_key, in_words, unit
 from omnidyn.statement import Statement
 from omnidyn.telling.sentence import Sentence

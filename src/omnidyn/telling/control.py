@@ -100,8 +100,8 @@ def _optimised(statement: Statement) -> str:
     return (
         f"optimised: the geometric mean of rms position and heading error along {all_of(numbers['paths'])}, free "
         f"and pushed, over {robots}; sensors {numbers['sensors']}, noise {numbers['noise']:g} m/s, delay "
-        f"{numbers['delay']} steps, {numbers['dt']:g} s a step; {numbers['evaluations']} settings tried; one robot in three "
-        "10 ms later, one 10 ms earlier with sensors a step worse"
+        f"{numbers['delay']} steps, {numbers['dt']:g} s a step; {numbers['evaluations']} settings tried; "
+        "one robot in three 10 ms later, one 10 ms earlier with sensors a step worse"
     )
 
 
@@ -133,8 +133,8 @@ SENTENCES = {
     "gains_kept": Sentence(_gains_kept),
     "optimised": Sentence(_optimised),
     "tuned_margins": Sentence(
-        "outputs may act {delay:m.3g} ms later than they do, and be {gain:.2g} times as strong, before the loop no longer "
-        "settles"
+        "outputs may act {delay:m.3g} ms later than they do, and be {gain:.2g} times as strong, before the loop no "
+        "longer settles"
     ),
     "judged_elsewhere": Sentence(_judged_elsewhere),
     "given_up_rest": Sentence("given up: rest: a voltage changes by {after:.3g} V a step, {before:.3g} V before"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from omnidyn.document import all_of
-from omnidyn.identification.motors.log import WORDS
+from omnidyn.identification.motors.input_between_rows import WORDS
 from omnidyn.statement import Statement
 from omnidyn.telling.sentence import Sentence, either
 

@@ -12,7 +12,8 @@ import pytest
 
 import omnidyn
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.export.feedforward.gains import axis_gains, gains, gains_csv
+from omnidyn.export.feedforward.gains import axis_gains, gains
+from omnidyn.export.feedforward.gains_csv import gains_csv
 from omnidyn.export.feedforward.road_runner import road_runner
 from omnidyn.export.feedforward.wpilib import wpilib
 from omnidyn.model.deadzone import axis_patterns

@@ -13,7 +13,8 @@ import pytest
 
 import omnidyn
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.export.ros.ros2_control import limits, odometry_error, ros2_control
+from omnidyn.export.ros.odometry_covariance import odometry_error
+from omnidyn.export.ros.ros2_control import limits, ros2_control
 from omnidyn.export.spelling import yaml_number
 from omnidyn.model.deadzone import axis_patterns
 from omnidyn.model.robot import Prior

@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.identification.motors.choice import fit_rmse, run_motor
 from omnidyn.identification.motors.fit import fit_motor
-from omnidyn.identification.motors.log import SUB, refined
+from omnidyn.identification.motors.input_between_rows import SUB, refined
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run
 from tests.support.codes import codes

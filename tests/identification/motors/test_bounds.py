@@ -7,7 +7,7 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import MotorLine
 from omnidyn.identification.motors.fit import fit_motor
 from omnidyn.identification.motors.log import motor_logs
-from omnidyn.identification.motors.rest import turned_under
+from omnidyn.identification.motors.steady_windows import turned_under
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.run import Run
 

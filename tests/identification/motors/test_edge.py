@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.motors.rest import edge_interval
+from omnidyn.identification.motors.starts_and_stops import edge_interval
 
 T = np.linspace(0.0, 0.79, 80)
 LAG, RATE, AT = 0.05, 2.0, 0.4

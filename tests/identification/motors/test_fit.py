@@ -5,10 +5,11 @@ import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.motors import choice
-from omnidyn.identification.motors.choice import WAYS, choose_motor, fit_rmse, run_motor
+from omnidyn.identification.motors.choice import fit_rmse, run_motor
+from omnidyn.identification.motors.choose_motor import WAYS, choose_motor
 from omnidyn.identification.motors.fit import fit_motor, fit_ways
-from omnidyn.identification.motors.log import HOLD
-from omnidyn.identification.motors.problem import step_numbers
+from omnidyn.identification.motors.input_between_rows import HOLD
+from omnidyn.identification.motors.motor_engine import step_numbers
 from omnidyn.run import Run
 
 SLOPE, BAND, LAG = 0.5, 0.4, 0.05

@@ -7,37 +7,10 @@ from omnidyn import MotorFit, identify, load_robot, read_log
 from omnidyn.identification.motors.choice import run_motor
 from omnidyn.identification.motors.fit import fit_motor
 from omnidyn.identification.motors.into_robot import motors_into_robot
-from omnidyn.run import Run
 from tests.support.codes import codes
+from tests.support.held_axis import DT, FINE, axis, run_of, stairs
 
 TICK = 2.0 * np.pi / 2000.0  # [rad] of an encoder
-DT, FINE = 0.005, 50  # [s] of a row; steps in it
-
-
-def axis(put_in, slope=(0.5, 0.5), inertia=0.025, band=0.4, offset=0.0, late=0):
-    """(position, speed) of each row from rest: inertia w' = u - offset - slope w - band sgn w, slope by direction.
-
-    late: steps of DT/FINE by which the input is. A step that would stop the mass within what friction holds stops it.
-    """
-    fine = np.concatenate([np.full(late, put_in[0]), np.repeat(put_in, FINE)])[: FINE * len(put_in)]
-    step, x, w, found = DT / FINE, 0.0, 0.0, []
-    for k, u in enumerate(fine.tolist()):
-        if k % FINE == 0:
-            found.append((x, w))
-        drive = w * inertia / step + u - offset - slope[w < 0.0] * w
-        new = (drive - min(max(drive, -band), band)) * step / inertia
-        x, w = x + 0.5 * step * (w + new), new
-    return np.array(found).T
-
-
-def stairs(seed, levels=40, rows=40, rest=20):
-    """Random levels of the input, from rest."""
-    return np.concatenate([np.zeros(rest), np.repeat(np.random.default_rng(seed).uniform(-2.0, 2.0, levels), rows)])
-
-
-def run_of(put_in, speed, seed=0, noise=0.02):
-    noisy = speed + noise * np.random.default_rng(seed).standard_normal(len(speed))
-    return Run(t=DT * np.arange(len(speed)), voltage=put_in[:, None], wheel_speed=noisy[:, None])
 
 
 def study_of(run, **how):

@@ -6,7 +6,7 @@ import pytest
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import MotorFit, MotorLine
-from omnidyn.identification.motors.start import line_of_speed
+from omnidyn.identification.motors.points import line_of_speed
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.run import Run
 from tests.support.codes import codes

@@ -10,8 +10,9 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import MotorFit, MotorLine
 from omnidyn.identification.motors.into_robot import motors_into_robot
 from omnidyn.identification.motors.log import motor_logs
+from omnidyn.identification.motors.motor_verdict import motors_verdict
 from omnidyn.identification.motors.steady_curve import curves_of_logs, curves_of_points, steady_speed
-from omnidyn.identification.motors.study import motors_verdict, study_points
+from omnidyn.identification.motors.study import study_points
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.drive import Drive
 from omnidyn.model.friction import Friction

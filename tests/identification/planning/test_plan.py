@@ -7,6 +7,7 @@ import pytest
 
 import omnidyn
 from omnidyn.identification.methods import OutputError
+from omnidyn.model.deadzone import axis_patterns
 from omnidyn.model.keys import BOX, Key
 from tests.support.pages import command
 
@@ -75,7 +76,7 @@ def test_the_fit_of_its_log_is_as_sure_as_it_was_told(made):
 def test_it_tells_more_than_ramps_and_steps_do():
     """The geometric mean of the standard errors, from the fit's own intervals, in the same time."""
     made = omnidyn.plan(AXEBOT, ROOM, noise=NOISE, free=("friction",))
-    patterns = omnidyn.axis_patterns(AXEBOT)
+    patterns = axis_patterns(AXEBOT)
     up = np.concatenate([np.linspace(0.0, 1.0, 250), np.zeros(50)])
     step = np.concatenate([np.ones(120), np.zeros(130)])
     shapes = [sign * level * shape for shape, level in ((up, 3.0), (step, 4.0)) for sign in (1.0, -1.0)]

@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.methods import SteadyState
-from omnidyn.identification.steady.steady_state import identify_lines
+from omnidyn.identification.steady.paper_lines import identify_lines
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 from tests.support.steady_logs import spoiled, steady_voltage

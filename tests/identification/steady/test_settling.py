@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.default_method import why_not_output_error
-from omnidyn.identification.steady.operating_points import settling_time
+from omnidyn.identification.steady.loop_speed import settling_time
 from omnidyn.model.dynamics import state_space
 from omnidyn.model.friction import Friction
 from omnidyn.model.robot_file import load_robot

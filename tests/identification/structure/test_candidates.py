@@ -15,8 +15,9 @@ from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear.driven_motion import motions
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.structure.missing import refits
-from omnidyn.identification.structure.missing.candidates import CHANGE, unoffered
+from omnidyn.identification.structure.missing.candidates import CHANGE
 from omnidyn.identification.structure.missing.laws import candidates
+from omnidyn.identification.structure.missing.rivals import unoffered
 from omnidyn.identification.structure.missing.switches import switches
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.motor import Motor

@@ -9,15 +9,8 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import SlipEngine
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.structure.ladder.models import (
-    FITS,
-    NOT_NEEDED_NOTE,
-    SPENT_NOTE,
-    Model,
-    Move,
-    Purse,
-    quick_first,
-)
+from omnidyn.identification.structure.ladder.models import Model, Move
+from omnidyn.identification.structure.ladder.slip_budget import FITS, NOT_NEEDED_NOTE, SPENT_NOTE, Purse, quick_first
 from tests.identification.structure.test_tails import AXEBOT, log, spoiled
 
 GRIP, MASS = "wheels.traction_mu", "body.mass_kg"

@@ -1,13 +1,13 @@
 """Adapters, with stand-ins of the libraries they are for: the classes and functions that an adapter asks of each."""
 
 import sys
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, MissingExtraError
-from omnidyn.interop.gymnasium import RobotVectorEnv, rsl_rl_env, sb3_env, torch_env
+from omnidyn.interop.gymnasium import RobotVectorEnv, policy_of_sb3, rsl_rl_env, sb3_env, torch_env
 
 
 class Tensor(np.ndarray):
@@ -131,3 +131,46 @@ def test_a_missing_library_is_named():
     for adapter, package in ((sb3_env, "stable-baselines3"), (rsl_rl_env, "torch"), (torch_env, "torch")):
         with pytest.raises(MissingExtraError, match=f"pip install {package}"):
             adapter(made())
+
+
+class Linear:
+    """A layer as of PyTorch."""
+
+    def __init__(self, random, columns, rows):
+        self.weight, self.bias = (random.standard_normal(shape).view(Tensor) for shape in ((rows, columns), (rows,)))
+
+    def __call__(self, x):
+        return x @ np.asarray(self.weight).T + np.asarray(self.bias)
+
+
+class Tanh:
+    def __call__(self, x):
+        return np.tanh(x)
+
+
+def model_of(modules, head, normalised=None):
+    policy = SimpleNamespace(mlp_extractor=SimpleNamespace(policy_net=modules), action_net=head)
+    return SimpleNamespace(policy=policy, get_vec_normalize_env=lambda: normalised)
+
+
+@pytest.mark.parametrize("is_normalised", [True, False])
+def test_a_policy_of_stable_baselines_acts_as_its_network_with_the_scales_folded_in(is_normalised):
+    random = np.random.default_rng(3)
+    modules, head = [Linear(random, 9, 8), Tanh(), Linear(random, 8, 8), Tanh()], Linear(random, 8, 3)
+    moments = SimpleNamespace(mean=random.standard_normal(9), var=random.uniform(0.1, 4.0, 9))
+    scales = SimpleNamespace(norm_obs=True, obs_rms=moments, epsilon=1e-8) if is_normalised else None
+    policy = policy_of_sb3(model_of(modules, head, scales), "velocity")
+    seen = random.standard_normal((50, 9))
+    values = (seen - moments.mean) / np.sqrt(moments.var + 1e-8) if is_normalised else seen
+    for module in (*modules, head):
+        values = module(values)
+    np.testing.assert_allclose(policy(seen), np.clip(values, -1.0, 1.0), rtol=1e-9, atol=1e-12)
+
+
+def test_a_network_that_is_no_tanh_is_refused():
+    random = np.random.default_rng(3)
+    relu = type("ReLU", (Tanh,), {})()
+    with pytest.raises(InputError, match="no network with tanh; got Linear, ReLU, Linear"):
+        policy_of_sb3(model_of([Linear(random, 9, 8), relu], Linear(random, 8, 3)), "velocity")
+    with pytest.raises(InputError, match="no such policy"):
+        policy_of_sb3(SimpleNamespace(policy=SimpleNamespace()), "velocity")

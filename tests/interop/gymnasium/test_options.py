@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
 
 import omnidyn
 from omnidyn.errors import InputError
@@ -91,7 +92,7 @@ def test_options_that_cannot_be_are_refused(task, options, words):
 
 def test_an_unknown_argument_is_refused_with_the_nearest():
     for make in (lambda **options: RobotEnv(**options), lambda **options: RobotVectorEnv(2, **options)):
-        with pytest.raises(InputError, match="an environment has no such option; got substep.*substeps"):
+        with pytest.raises(InputError, match=r"an environment has no such option; got substep.*substeps"):
             make(substep=3)
         with pytest.raises(InputError, match="unknown render mode; got human"):
             make(render_mode="human")
@@ -103,7 +104,7 @@ def test_the_terms_of_the_reward_add_up_and_success_is_told(task):
     envs.reset(seed=2)
     core = envs.environments
     for _ in range(30):
-        _, reward, terminated, truncated, infos = envs.step(np.full((4, 3), 0.3))
+        _, reward, _, _, infos = envs.step(np.full((4, 3), 0.3))
         names = [name for name in infos if name.startswith("reward_")]
         assert len(names) == 2
         np.testing.assert_array_equal(reward, infos[names[0]] + infos[names[1]])
@@ -138,11 +139,11 @@ def test_a_subclass_has_a_reward_and_an_end_of_its_own():
         envs.reset(seed=4)
     actions = np.full((64, 3), 0.2)
     seen, reward, *_ = plain.step(actions)
-    own_seen, own_reward, terminated, *_ = own.step(actions)
+    _, own_reward, terminated, *_ = own.step(actions)
     np.testing.assert_allclose(own_reward, reward - 0.1 * 3 * 0.2**2)
     np.testing.assert_array_equal(terminated, np.hypot(*seen[:, 3:5].T) > 0.9)
     assert 0 < terminated.sum() < 64
-    _, reward, again, *_ = own.step(actions)
+    own.step(actions)
     assert own.environments.steps_done[terminated].max() == 0  # those begin anew, the others go on
     assert own.environments.steps_done[~terminated].min() == 2
 
@@ -160,3 +161,18 @@ def test_an_environment_pickles_and_goes_on_with_the_same_bits(threads):
         np.testing.assert_array_equal(one, other)
     envs.close()
     copied.close()
+
+
+def test_what_the_page_says_of_wrappers_and_ends_in_the_same_step_is_so():
+    envs = RecordEpisodeStatistics(RobotVectorEnv(2, duration=0.1, autoreset_mode="SameStep"))
+    envs.reset(seed=1)
+    rewards, returns = [], []
+    for _ in range(10):
+        _, reward, _, truncated, infos = envs.step(np.full((2, 3), 0.3))
+        rewards.append(reward)
+        if truncated.any():
+            returns.append(infos["episode"]["r"])
+    np.testing.assert_allclose(returns, np.reshape(rewards, (2, 5, 2)).sum(axis=1), rtol=1e-6)
+    with pytest.raises(ValueError, match="SAME_STEP"):
+        NormalizeObservation(RobotVectorEnv(2, autoreset_mode="SameStep"))
+    NormalizeObservation(RobotVectorEnv(2))

@@ -13,6 +13,7 @@ from omnidyn.logs.info import read_info
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.run_file import write_run
 from omnidyn.run import Run
+from tests.support.codes import said
 
 
 def write_text(folder):
@@ -66,8 +67,8 @@ def test_what_it_held_at_first_is_read(tmp_path, write):
         name: list(map(repr, column)) for name, column in quiet.columns.items()
     }
     assert grown.sha256 == hashlib.sha256(before).hexdigest()
-    assert any("grew while it was read" in note for note in grown.notes), grown.notes
-    assert not any("grew" in note for note in quiet.notes)
+    assert any("grew while it was read" in note for note in said(grown.notes)), grown.notes
+    assert not any("grew" in note for note in said(quiet.notes))
 
 
 def test_messages_in_the_journal_of_a_recorder_are_said_to_be_missing(tmp_path):

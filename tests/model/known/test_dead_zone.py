@@ -130,3 +130,13 @@ def test_a_robot_that_may_never_move():
 def test_a_pattern_of_the_wrong_width_is_refused():
     with pytest.raises(InputError, match=r"wrong voltage pattern; got \(1, 2\); expected one entry per wheel \(3\)"):
         dead_zone(AXEBOT, [1.0, 2.0])
+
+
+def test_directions_of_ones_own_and_what_moves():
+    """Forward and sideways are the axes x and y: their directions give the same volts as their patterns."""
+    zone = dead_zone(load_robot("axebot"), directions=[0.0, np.pi / 2.0])
+    np.testing.assert_allclose(zone.voltage, [zone.rows[0].scale, zone.rows[1].scale], rtol=1e-12)
+    assert zone.patterns.shape == (2, 3)
+    np.testing.assert_allclose(zone.patterns[0], [0.0, 1.0, -1.0], atol=1e-12)
+    ahead = np.array([0.99, 1.01])[:, None] * zone.voltage[0] * zone.patterns[0]
+    assert zone.moving_axes(ahead).tolist() == [[False] * 3, [True, False, False]]

@@ -86,14 +86,14 @@ def test_a_sample_moves_as_its_robots_do():
 
 
 def test_a_robot_of_a_sample_holds_the_numbers_that_were_drawn():
-    drawn = omnidyn.sample(known(ROBOT, (0.3, 0.1, 0.001), MATRIX), 300, seed=4)
+    drawn = omnidyn.sample(known(ROBOT, (0.3, 0.1, 0.001), MATRIX), 300, rng=4)
     for key, column in zip(map(Key.parse, KEYS), drawn.values.T, strict=True):
         np.testing.assert_array_equal([key.get(robot) for robot in drawn], column)
 
 
 def test_what_a_large_std_becomes_is_said_the_median_stays():
     body = ROBOT.replace(priors={"body.mass_kg": Prior(std=1.0), KEYS[0]: Prior(std=2.2), KEYS[1]: Prior(std=0.2)})
-    drawn = omnidyn.sample(body, 20_001, seed=1)
+    drawn = omnidyn.sample(body, 20_001, rng=1)
     mass, coulomb, viscous = (drawn.values[:, drawn.keys.index(key)] for key in ("body.mass_kg", *KEYS[:2]))
     for values, median, std in ((mass, 1.5, 1.0 / 1.5), (viscous, 0.94, 0.2 / 0.94)):
         assert np.median(values) == pytest.approx(median, rel=1e-3)

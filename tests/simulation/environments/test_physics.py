@@ -232,8 +232,8 @@ def test_implicit_poses_are_near_those_of_a_fine_tolerance(name):
 def test_other_laws_are_refused_by_name():
     with pytest.raises(UnsupportedError, match="current limit"):
         Environments(AXEBOT.replace(motor=AXEBOT.motor.replace(current_limit=2.0)))
+    speed = omnidyn.load_robot("robotino")
     with pytest.raises(InputError, match="they leave out the loop"):
-        speed = omnidyn.load_robot("robotino")
         Environments(speed, parameters=batch_parameters([speed]))
     with pytest.raises(InputError, match="one kind of drive"):
         Environments([AXEBOT, turning()])

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from omnidyn.export.bodies.links import height_of, inertias, places, several
+from omnidyn.export.bodies.inertias import height_of, inertias, places, several
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.spelling import attribute, number, xml_comment

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from omnidyn.export.bodies.links import Links, WheelLink, height_of, links, several
+from omnidyn.export.bodies.inertias import height_of, several
+from omnidyn.export.bodies.links import Links, WheelLink, links
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.spelling import attribute, number, xml_comment

@@ -66,8 +66,6 @@ def description(
 """
 
 
-# Written from the standard (FMI 3.0.2, modelica.org), as the part for FMI 2 is; a status has the same numbers in both.
-
 FMI3_C = r"""
 /* FMI 3 on top of FMI 2: what a unit for co-simulation without events, clocks and other types of variables has. */
 #include <stdbool.h>

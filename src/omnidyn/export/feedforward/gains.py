@@ -13,7 +13,6 @@ Standard errors: the delta method over the numbers of the file that have a std, 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -21,14 +20,10 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.errors import InputError
-from omnidyn.export.contract import Export
-from omnidyn.export.features import left_out, refuse
-from omnidyn.export.spelling import hash_comment, number
 from omnidyn.model.deadzone import axis_patterns, push_per_volt
 from omnidyn.model.dynamics import damping, motor_wrench
-from omnidyn.model.keys import COULOMB, Key
-from omnidyn.model.known.told import guesses, told
+from omnidyn.model.keys import Key
+from omnidyn.model.known.told import told
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import coulomb_along
@@ -129,72 +124,3 @@ def _spread(slopes: FloatArray, correlation: FloatArray) -> FloatArray:
     """sqrt(diag(J R J^T)), J the slopes in units of each std. slopes: shape (keys, ...)."""
     variance = np.einsum("k...,kl,l...->...", slopes, correlation, slopes)
     return np.sqrt(np.maximum(variance, 0.0))
-
-
-# Gains that rest on a guess of the friction: a robot of `omnidyn init`, before a fit
-
-
-def guessed_gains(robot: Robot, force_guess: bool) -> tuple[str, ...]:
-    """What to say of gains whose kS is a guess; () where the Coulomb friction is known.
-
-    Raises InputError for such gains unless `force_guess`: on a robot they look like measured ones.
-    """
-    keys = [key for key in guesses(robot) if key.startswith("friction.") and COULOMB in key]
-    if not keys:
-        return ()
-    if not force_guess:
-        raise InputError(
-            "these gains are guesses: no log has told the friction of this robot",
-            got=f"a guess for {', '.join(keys)}",
-            expected="friction that was identified, measured or given",
-            remedy="fit it by `omnidyn identify` and export the fit, or use `force_guess`",
-        )
-    return (f"GUESSES, not measured: kS, and what follows from it, rest on a guess for {', '.join(keys)}",)
-
-
-def check_ticks(ticks_per_turn: float | None) -> None:
-    """Raises InputError for what is no number of ticks in a turn of a wheel."""
-    if ticks_per_turn is not None and not 0.0 < ticks_per_turn <= MOST_TICKS:
-        raise InputError(
-            "no number of ticks in a turn of a wheel",
-            got=ticks_per_turn,
-            expected=f"more than 0 and at most {MOST_TICKS:g}",
-            where="ticks_per_turn",
-        )
-
-
-# gains: kS, kV, kA with standard errors as CSV; and how the snippets spell one
-
-
-def gains_csv(robot: Robot, ticks_per_turn: float | None = None) -> Export:
-    """kS, kV and kA of each axis and of each wheel on it. A std that nothing is known of is an empty cell.
-
-    ticks_per_turn: of the encoder, in a turn of the wheel; the gains of the wheels are then per tick, else per rad.
-    """
-    refuse("gains", robot)
-    check_ticks(ticks_per_turn)
-    omissions = left_out("gains", robot)
-    lines = ["place,gain,value,std,unit"]
-    found = [row if row.place in AXES else in_ticks(row, ticks_per_turn) for row in rows(robot)]
-    lines += [f"{row.place},{row.name},{number(row.value)},{_std(row)},{row.unit}" for row in found]
-    head = hash_comment(
-        [f"{robot.name}: volts of the most loaded motor, by omnidyn", *(f"not in it: {words}" for words in omissions)]
-    )
-    return Export("gains", robot.name, {"gains.csv": head + "\n".join(lines) + "\n"}, omissions)
-
-
-def in_ticks(row: GainRow, ticks_per_turn: float | None) -> GainRow:
-    """A gain per rad/s of a wheel as one per tick/s; as it is where the ticks are not known, or of kS."""
-    if ticks_per_turn is None or row.name == NAMES[0]:
-        return row
-    size = 2.0 * math.pi / ticks_per_turn
-    return row._replace(value=row.value * size, std=row.std * size, unit=row.unit.replace("/rad", "/tick"))
-
-
-def _std(row: GainRow) -> str:
-    return number(row.std) if math.isfinite(row.std) else ""
-
-
-def spread(row: GainRow) -> str:
-    """How sure a gain is, in words for a comment: "+- 0.02 V", or that nothing is known."""
-    return f"+- {row.std:.2g} {row.unit}" if math.isfinite(row.std) else f"{row.unit}, std not known"

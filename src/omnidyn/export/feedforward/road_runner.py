@@ -19,7 +19,9 @@ import numpy as np
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
-from omnidyn.export.feedforward.gains import AXES, NAMES, GainRow, check_ticks, guessed_gains, rows, spread
+from omnidyn.export.feedforward.gains import AXES, NAMES, GainRow, rows
+from omnidyn.export.feedforward.gains_csv import spread
+from omnidyn.export.feedforward.guessed_gains import check_ticks, guessed_gains
 from omnidyn.export.spelling import java_comment, number
 from omnidyn.model.robot import Robot
 

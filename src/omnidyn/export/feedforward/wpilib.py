@@ -12,7 +12,9 @@ import numpy as np
 
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
-from omnidyn.export.feedforward.gains import AXES, GainRow, gains, guessed_gains, rows, spread
+from omnidyn.export.feedforward.gains import AXES, GainRow, gains, rows
+from omnidyn.export.feedforward.gains_csv import spread
+from omnidyn.export.feedforward.guessed_gains import guessed_gains
 from omnidyn.export.spelling import c_comment, java_comment, number, python_comment
 from omnidyn.model.robot import Robot
 

@@ -20,8 +20,10 @@ from omnidyn.identification.methods import AUTO, MotorFit
 from omnidyn.identification.methods import degrees as degrees_of
 from omnidyn.identification.motors.estimate import BAND, LATENCY, OFFSET, MotorEstimate
 from omnidyn.identification.motors.fit import fit_motor, solved
-from omnidyn.identification.motors.log import WORDS, MotorLog
-from omnidyn.identification.motors.problem import MotorProblem, MotorRecord, motor_problem, motor_record
+from omnidyn.identification.motors.input_between_rows import WORDS
+from omnidyn.identification.motors.log import MotorLog
+from omnidyn.identification.motors.motor_engine import MotorProblem
+from omnidyn.identification.motors.problem import MotorRecord, motor_problem, motor_record
 from omnidyn.identification.motors.rest import turns_both_ways
 from omnidyn.identification.motors.windows import line_numbers
 from omnidyn.identification.output_error.problem.nuisances import earliest

@@ -19,8 +19,9 @@ from omnidyn.arrays import FloatArray
 from omnidyn.document import plain
 from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, MotorEstimate
 from omnidyn.identification.motors.log import MotorLog, orientation
+from omnidyn.identification.motors.one_way_line import NO_LINE
 from omnidyn.identification.motors.rest import CURRENT
-from omnidyn.identification.motors.start import NO_LINE, MotorStart
+from omnidyn.identification.motors.start import MotorStart
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.logs.plateaus import command_changes, holds
 from omnidyn.statement import NOTE, WARNING, Statement

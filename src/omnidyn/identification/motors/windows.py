@@ -17,7 +17,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.motors.estimate import BAND, LAG, OFFSET, SLOPE
-from omnidyn.identification.motors.log import InputIntegral, MotorLog, rows_with
+from omnidyn.identification.motors.input_between_rows import InputIntegral
+from omnidyn.identification.motors.log import MotorLog, rows_with
 from omnidyn.logs.plateaus import STEPWISE, find_plateaus
 from omnidyn.logs.resolved import unresolved_input
 from omnidyn.statistics import (

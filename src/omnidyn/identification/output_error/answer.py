@@ -13,7 +13,7 @@ from omnidyn.identification.ladder import Ladder
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.cures import Blind
 from omnidyn.identification.stability import Stability
-from omnidyn.identification.steady.study_table import Difference
+from omnidyn.identification.steady.group_numbers import Difference
 from omnidyn.model.log_effects import log_mark
 from omnidyn.run import Run
 from omnidyn.statement import ERROR, NOTE, Statement

@@ -10,7 +10,7 @@ needs no idea of what is wrong. Points at which a part of the chosen shape is at
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,32 +20,22 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Force, LackOfFit, Remedy
 from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 from omnidyn.identification.steady.choice import blocks_of
+from omnidyn.identification.steady.linear_shape import LinearShape, SolvedShape, all_moving
 from omnidyn.identification.steady.operating_points import ForcePoints
 from omnidyn.identification.steady.shapes import (
-    HUBER,
-    RAYLEIGH,
     ShapeFit,
-    element_speeds,
     fold_numbers,
     is_turning,
     mean_error,
-    on_rollers,
-    seen_components,
 )
+from omnidyn.identification.steady.unoffered_parts import ABOUT_YAW, UNOFFERED_SHAPES
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import sin_cos_deg
 from omnidyn.statement import NOTE, Statement
-from omnidyn.statistics import huber_weight
 
 FALSE_ALARM = 0.002  # of all tests of a group together, by Student's t: few directions have longer tails
 FORCE_SHARE = 0.02  # of the force: what is missing and smaller does not matter
-SLOW_SHARE = 0.02  # of the fastest rim: a part of the shape that moves less may be at rest
-STILL_TIMES = 2.0  # as sure as that: what is not known to move is left out, and what hardly is
 SPARE_FOLDS = 6  # folds beyond the levels that a test needs
-ROUNDS = 10  # of robust weights
-TURNED_DEG = (15.0, 30.0, 45.0, 60.0, 75.0)
 REPEATS = "repeats"
-ABOUT_YAW = "turning left and right"
 
 
 def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
@@ -63,7 +53,7 @@ def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
     plain_fit = problem.solve(np.zeros((*problem.target.shape, 0)))
     if plain_fit is None:
         return untested_lack
-    fit_by_key: dict[str, _Solved] = {}
+    fit_by_key: dict[str, SolvedShape] = {}
     for key, columns in UNOFFERED_SHAPES.items():
         shape_fit = problem.solve(problem.components(columns(robot, moving))) if has_yaw or key != ABOUT_YAW else None
         if shape_fit is not None:
@@ -100,7 +90,7 @@ def _matters(force: Force, comparison: BlockComparison, size: float) -> bool:
     return force.p < FALSE_ALARM and comparison.is_better and force.size > FORCE_SHARE * size
 
 
-def _of_blocks(fit: _Solved, fold: IntArray) -> FloatArray:
+def _of_blocks(fit: SolvedShape, fold: IntArray) -> FloatArray:
     """The sum of squared errors of each block of directions that was left out."""
     return np.bincount(blocks_of(fold), (fit.error**2).sum(axis=1)).astype(float)
 
@@ -122,85 +112,7 @@ def _remedy(key: str, forces: Mapping[str, Force], comparison: BlockComparison, 
     )
 
 
-def all_moving(robot: Robot, points: ForcePoints, fit: ShapeFit) -> ForcePoints:
-    """The points at which every part of a shape moves: one at rest holds any force."""
-    slow = element_speeds(fit.shape, robot, points)
-    fastest = np.linalg.norm(points.twist * [1.0, 1.0, float(np.mean(robot.wheels.robot_radius))], axis=1)
-    bound = np.maximum(STILL_TIMES * points.still, SLOW_SHARE * fastest)
-    return points.chosen(np.asarray((slow > bound[:, None]).all(axis=1)))
-
-
-@dataclass(frozen=True, eq=False)
-class _Solved:
-    """A linear fit. level, std: of all columns; error: left out, (points, components); added: force of the new ones."""
-
-    level: FloatArray
-    std: FloatArray
-    error: FloatArray
-    residual: FloatArray
-    degrees: int
-    new: int
-
-
-class LinearShape:
-    """The chosen shape, linear about its fitted levels, with more columns beside it."""
-
-    def __init__(self, robot: Robot, points: ForcePoints, fit: ShapeFit, has_yaw: bool):
-        self.arm, self.seen = float(np.mean(robot.wheels.robot_radius)), seen_components(points, has_yaw)
-        wrench, slope = fit.shape.table(robot, points, is_turning_fit(fit), fit.free)
-        self.base, self.force = self.components(slope), self.components(wrench[:, :, None])
-        self.target = self.components((points.wrench - wrench)[:, :, None])[:, :, 0] + self.base @ fit.free
-        self.fold, self.count = fold_numbers(points), int(fold_numbers(points).max()) + 1
-        self.sizes = np.linalg.norm(self.base, axis=(0, 1)) > 0.0
-
-    def components(self, wrench: FloatArray) -> FloatArray:
-        """(F_x, F_y), and T / b, of an array of shape (points, 3, levels), as far as a point tells them."""
-        scale = np.array([1.0, 1.0, self.arm])[None, :, None]
-        return (wrench / scale)[:, : self.seen.shape[1]] * self.seen[:, :, None]
-
-    def solve(self, extra_columns: FloatArray) -> _Solved | None:
-        """Robust least squares, each fold left out once; None where the columns are not determined."""
-        design = np.concatenate([self.base[:, :, self.sizes], extra_columns], axis=2)
-        norm = np.linalg.norm(design, axis=(0, 1))
-        if (norm == 0.0).any() or self.count <= design.shape[2] + 1:
-            return None
-        design, weight = design / norm, np.ones(len(design))
-        if np.linalg.cond(design.reshape(-1, len(norm))) > 1e4:
-            return None
-        level = np.zeros(len(norm))
-        for _ in range(ROUNDS):
-            normal, right = self._sums(design, weight)
-            level = np.linalg.solve(normal.sum(axis=0), right.sum(axis=0))
-            length = np.linalg.norm(self.target - design @ level, axis=1)
-            scale = float(np.median(length)) / RAYLEIGH
-            if scale == 0.0:
-                break
-            weight = huber_weight(length, HUBER * scale)
-        normal, right = self._sums(design, weight)
-        normal_without_fold = normal.sum(axis=0) - normal
-        if np.linalg.cond(normal_without_fold).max() > 1e8:
-            return None
-        levels = np.linalg.solve(normal_without_fold, (right.sum(axis=0) - right)[:, :, None])[:, :, 0]
-        deviation = levels - levels.mean(axis=0)
-        std = np.sqrt((self.count - 1) / self.count * (deviation**2).sum(axis=0))
-        error = self.target - np.einsum("ncp,np->nc", design, levels[self.fold])
-        return _Solved(level, std, error, self.target - design @ level, self.count - len(level), extra_columns.shape[2])
-
-    def _sums(self, design: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The normal equations of each fold: (folds, p, p), (folds, p)."""
-        p = design.shape[2]
-        normal, right = np.zeros((self.count, p, p)), np.zeros((self.count, p))
-        np.add.at(normal, self.fold, weight[:, None, None] * np.einsum("nca,ncb->nab", design, design))
-        np.add.at(right, self.fold, weight[:, None] * np.einsum("nca,nc->na", design, self.target))
-        return normal, right
-
-
-def is_turning_fit(fit: ShapeFit) -> bool:
-    """Whether a shape was fitted to the torque too."""
-    return fit.error.shape[1] == 3
-
-
-def _gain(new_fit: _Solved, plain_fit: _Solved, fold: IntArray, tests: int) -> Force:
+def _gain(new_fit: SolvedShape, plain_fit: SolvedShape, fold: IntArray, tests: int) -> Force:
     """What the new columns add to the force, and take away of the left-out error."""
     new = slice(len(new_fit.level) - new_fit.new, None)
     size = np.abs(new_fit.level[new]) / np.sqrt(len(new_fit.error))  # the columns are of length 1
@@ -221,7 +133,7 @@ class _Repeated:
     is_tested: bool = False
 
 
-def _repeated(plain_fit: _Solved, problem: LinearShape, levels: int) -> _Repeated:
+def _repeated(plain_fit: SolvedShape, problem: LinearShape, levels: int) -> _Repeated:
     """Whether the errors of one direction agree more than by chance: spread of their means, beside that within."""
     counts = np.bincount(problem.fold, minlength=problem.count)
     repeated_rows = counts[problem.fold] > 1
@@ -245,48 +157,3 @@ def _repeated(plain_fit: _Solved, problem: LinearShape, levels: int) -> _Repeate
         excess / max(square_between + square_within, 1e-300),
         True,
     )
-
-
-# ---- what is not offered ----------------------------------------------------------------------------------
-
-
-def _turned_box(points: ForcePoints, angle: float) -> FloatArray:
-    """(C_1 sgn(e_1 . v) e_1, C_2 sgn(e_2 . v) e_2) of two axes at this angle. Shape (points, 3, 2)."""
-    sin, cos = sin_cos_deg(angle)
-    axes = np.array([[cos, sin, 0.0], [-sin, cos, 0.0]])
-    speed = points.twist @ axes.T
-    side = np.where(np.abs(speed) > points.still[:, None], np.sign(speed), 0.0)
-    return axes.T[None] * side[:, None, :]
-
-
-def _one_sided(points: ForcePoints, axis: int) -> FloatArray:
-    """A force to the positive side of an axis, as large as the part of the motion along it. Shape (points, 3, 1)."""
-    speed = points.speed
-    return _on_axis(points, np.abs(points.twist[:, axis]) / np.where(speed > 0.0, speed, 1.0), axis)
-
-
-def _on_axis(points: ForcePoints, value: FloatArray, axis: int) -> FloatArray:
-    column = np.zeros((len(points), 3, 1))
-    column[:, axis, 0] = value
-    return column
-
-
-# Columns of what is not offered, by key, and those of it that a tilted floor looks like.
-UNOFFERED_SHAPES: dict[str, Callable[[Robot, ForcePoints], FloatArray]] = {
-    **{f"box turned by {angle:.0f} deg": lambda r, p, angle=angle: _turned_box(p, angle) for angle in TURNED_DEG},
-    "rollers": on_rollers,
-    "forward and backward": lambda r, p: _one_sided(p, 0),
-    "left and right": lambda r, p: _one_sided(p, 1),
-    "pull": lambda r, p: np.concatenate([_on_axis(p, np.ones(len(p)), axis) for axis in (0, 1)], axis=2),
-    ABOUT_YAW: lambda r, p: _on_axis(p, np.ones(len(p)), 2),
-}
-TILTED_FLOOR = {"forward and backward", "left and right", "pull"}
-
-
-def unoffered_columns(robot: Robot, points: ForcePoints, problem: LinearShape, has_yaw: bool) -> list[FloatArray]:
-    """What each part that is not offered would add, in components of a problem: (points, components, levels) each."""
-    return [
-        problem.components(columns(robot, points))
-        for key, columns in UNOFFERED_SHAPES.items()
-        if has_yaw or key != ABOUT_YAW
-    ]

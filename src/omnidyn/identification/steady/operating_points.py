@@ -21,11 +21,11 @@ from omnidyn.identification.steady.points import refuse_losses
 from omnidyn.logs.plateaus import ANGLE, COMMANDS, SAME_COMMAND, Plateau, find_plateaus, held_pieces, live_angle, pool
 from omnidyn.logs.sensor_rows import on_clock_of_wheels
 from omnidyn.model.actuation import asked_voltage, reaching
-from omnidyn.model.dynamics import frame_wrench, state_space
+from omnidyn.model.dynamics import frame_wrench
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.motor import settled_current, traction
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import rim_speed, twist_from_wheel_speed, wheel_speed, wrench_from_traction
+from omnidyn.model.wheels import rim_speed, twist_from_wheel_speed, wrench_from_traction
 from omnidyn.run import Run
 from omnidyn.statement import NOTE, Statement, statements
 
@@ -475,44 +475,3 @@ def _moving(points: ForcePoints, robot: Robot) -> ForcePoints:
     moving_points = points.chosen(moves)
     rest_note = Statement("windows_at_rest", NOTE, numbers={"windows": resting})
     return replace(moving_points, notes=(*moving_points.notes, rest_note)) if resting else moving_points
-
-
-# How fast a robot follows its firmware's speed loop, beside how often its log has a row
-#
-# A loop that settles within a row shows no transient: whole logs then say no more than their steady stretches do.
-
-SETTLING_CONSTANTS = 2.0  # time constants: what is left of a transient then is a seventh
-
-
-def settling_time(robot: Robot) -> float:
-    """Slowest time constant [s] of the robot within its speed loop, linear; inf where it does not settle.
-
-        v' = A v - B (kp S v + ki S z),   z' = v,   S twist = speeds of the wheels
-
-    A, B of `state_space`: sliding, below the voltage limit. At least a period of the loop.
-    """
-    system, turn_matrix = state_space(robot), wheel_speed(robot.wheels, np.eye(3)).T
-    kp, ki = (np.reshape(gain, (-1, 1)) * turn_matrix for gain in (robot.drive.kp, robot.drive.ki))
-    matrix = system.A - system.B @ kp
-    if np.any(robot.drive.ki):
-        matrix = np.block([[matrix, -system.B @ ki], [np.eye(3), np.zeros((3, 3))]])
-    slowest = float(-np.linalg.eigvals(matrix).real.max())
-    return max(1.0 / slowest, 1.0 / (robot.drive.rate or np.inf)) if slowest > 0.0 else np.inf
-
-
-def why_no_transient(runs: Sequence[Run], robot: Robot) -> str:
-    """Why logs of set speeds are not worth fitting whole, in words; "" where they are.
-
-    They are where the loop is seen settling, and where a current or a speed is missing: then the steady state does not
-    tell either.
-    """
-    if any(run.current is None or (run.wheel_speed is None and run.wheel_angle is None) for run in runs):
-        return ""
-    settled_time = SETTLING_CONSTANTS * settling_time(robot)
-    row = min(run.step for run in runs)
-    if settled_time > row:
-        return ""
-    return (
-        f"the speed loop of {robot.name} settles in {1e3 * settled_time:.0f} ms, a row comes every {1e3 * row:.0f} ms: "
-        "no transient is seen, so that whole logs say no more than their steady stretches, and take longer to fit"
-    )

@@ -15,35 +15,34 @@ from itertools import combinations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.errors import InsufficientDataError, OmnidynError
+from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.force_scale import scale_of_traction
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.methods import SteadyState
 from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
+from omnidyn.identification.steady.group_numbers import Difference, Travel, Viscous
 from omnidyn.identification.steady.lack_of_fit import lack_of_fit
 from omnidyn.identification.steady.levels import estimate_of
-from omnidyn.identification.steady.moment import Moment, levelled, moments, moments_by_shape
+from omnidyn.identification.steady.moment import Moment, levelled, moments
+from omnidyn.identification.steady.moment_by_shape import moments_by_shape
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, SteadyWindows, steady_windows
+from omnidyn.identification.steady.paper_lines import steady_table
+from omnidyn.identification.steady.sensitivity_to_fixed import moved_by_the_file, rests_on
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, ShapeFit, fit_shape, friction_of, is_turning
-from omnidyn.identification.steady.steady_state import steady_table
-from omnidyn.identification.steady.study_table import (
-    Difference,
-    SteadyStudy,
-    Travel,
-    Viscous,
+from omnidyn.identification.steady.study_statements import (
     advice,
     fit_statements,
     lack_statements,
     point_statements,
     result_statements,
 )
+from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.friction import Friction
-from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand, find_key
+from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, find_key
 from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
-from omnidyn.model.known.told import known_priors
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import GUESSES, Robot
 from omnidyn.run import Run
@@ -387,63 +386,3 @@ def _differences(choice: ShapeChoice) -> tuple[Difference, ...]:
             gap = values[1] - values[0]
             differences.append(Difference(key, first, second, values, gap, std, gap - half, gap + half))
     return tuple(differences)
-
-
-# What the levels of a steady state rest on: the logs asked anew with each fixed number 1 % larger
-
-STEP = 0.01
-# Keys, with what follows them: those that forces and speeds are made with.
-FIXED = {
-    TORQUE: (EMF,),
-    "motor.resistance_ohm": (),
-    "motor.gear_ratio": (),
-    "wheels.wheel_radius_m": (),
-    "wheels.robot_radius_m": (),
-    EMF: (),
-}
-
-
-def rests_on(
-    robot: Robot, value: Mapping[str, float], refit: Callable[[Robot], Mapping[str, float]]
-) -> dict[str, dict[str, float]]:
-    """Number -> fixed key -> relative change of the number per percent of the key. refit: the numbers of a robot."""
-    changes_by_number: dict[str, dict[str, float]] = {name: {} for name in value}
-    for key, tied_keys in FIXED.items():
-        try:
-            other_values = refit(_larger(robot, key, *tied_keys))
-        except OmnidynError:  # no number of this robot, or none that these logs can be read with
-            continue
-        for name, value_now in value.items():
-            if value_now > 0.0 and name in other_values:
-                changes_by_number[name][key] = other_values[name] / value_now - 1.0
-    return changes_by_number
-
-
-def moved_by_the_file(
-    robot: Robot, value: Mapping[str, float], refit: Callable[[Robot], Mapping[str, float]]
-) -> FloatArray:
-    """What one std of each number that the file of the robot knows only so far moves the numbers by, to first order.
-    Shape (numbers, K). A torque constant brings the EMF constant with it: both are one number of the magnet."""
-    std_by_key = {key: std for key, (_, std) in known_priors(robot).items() if Key.parse(key).name in FIXED}
-    magnet = any(Key.parse(key).name == TORQUE for key in std_by_key)
-    shifts = []
-    for key, std in std_by_key.items():
-        place = Key.parse(key)
-        if magnet and place.name == EMF:
-            continue
-        try:
-            other_values = refit(_larger(robot, key, *(str(Key(name, place.index)) for name in FIXED[place.name])))
-        except OmnidynError:  # no number that these logs are read with
-            continue
-        size = STEP * float(place.get(robot))
-        shifts.append(
-            [std / size * (other_values.get(name, value_now) - value_now) for name, value_now in value.items()]
-        )
-    return np.array(shifts).reshape(-1, len(value)).T
-
-
-def _larger(robot: Robot, *names: str) -> Robot:
-    for name in names:
-        for key in map(Key.parse, expand(name, robot)):
-            robot = key.set(robot, (1.0 + STEP) * float(key.get(robot)))
-    return robot

@@ -10,28 +10,29 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import small_matrices
-from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.linear.driven_motion import motions
 from omnidyn.identification.output_error.linear.rounded_inputs import effects, with_rounding
-from omnidyn.identification.output_error.linear.rows import FitRows, Linear, solved
-from omnidyn.identification.output_error.linear.workbench import Workbench, scaled
+from omnidyn.identification.output_error.linear.rows import FitRows, Linear
+from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.output_error.problem.bristles import bending_keys
+from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.decimated import Decimated
-from omnidyn.identification.output_error.problem.friction_laws import falls
-from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem, bounded
+from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
 from omnidyn.identification.structure.misfit import FALSE_SHARE, Misfit, chance, memory_beside, misfit, with_cause
-from omnidyn.identification.structure.missing.candidates import Candidate, Trial, unoffered
+from omnidyn.identification.structure.missing.candidates import Candidate, Trial
+from omnidyn.identification.structure.missing.computed_twist import with_odometry
 from omnidyn.identification.structure.missing.laws import candidates
 from omnidyn.identification.structure.missing.refits import refits
-from omnidyn.identification.structure.missing.remedies import remedies, with_odometry
-from omnidyn.identification.structure.noise_level import binned, noise_levels
+from omnidyn.identification.structure.missing.remedies import remedies
+from omnidyn.identification.structure.missing.rivals import unoffered
+from omnidyn.identification.structure.noise_level import noise_levels
+from omnidyn.identification.structure.residual_bins import binned
+from omnidyn.identification.structure.sensitivity_to_fixed import rests_on
 from omnidyn.identification.structure.shifts import stability
 from omnidyn.identification.structure.tails import as_counted, calmer, wild_samples
-from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
 from omnidyn.model.known.breakaway_levels import holding
 
 SLOW_DEGREES = 2.0  # degrees of freedom with which the power of the slowest errors is known within its own size
@@ -180,70 +181,3 @@ def _sizes(rows: FitRows, channels: Mapping[str, float]) -> dict[str, float]:
     """How large a share of the residual of each column is, root mean square."""
     mean = rows.squares(rows.residual) / np.maximum(rows.added(lambda k, j: rows.masks[k][j]), 1.0)
     return dict(zip(channels, np.sqrt(np.array([*channels.values()]) * mean).tolist(), strict=True))
-
-
-# What each fitted number rests on: how far it would move if a number that was taken as it stands were another one
-
-PERCENT = 0.01
-TRIAL_CHANGE = 0.01  # relative change of a fixed number, either way is alike
-FIXED = (
-    "body.mass_kg",
-    "body.inertia_kg_m2",
-    "wheels.wheel_radius_m",
-    "wheels.robot_radius_m",
-    "motor.resistance_ohm",
-    TORQUE,
-    EMF,
-    "motor.gear_ratio",
-    "motor.rotor_inertia_kg_m2",
-    "wheels.inertia_kg_m2",
-    "motor.voltage_drop_V",
-    "motor.current_limit_A",
-    "wheels.traction_mu",
-    f"{CENTRE}[0]",
-    f"{CENTRE}[1]",
-)
-
-LEVELS = (f"{BODY_AXES}.breakaway", f"{DIRECTION}.breakaway", f"{DIRECTION}.yaw_breakaway", f"{WHEELS}.breakaway")
-TRIED_FALL = 1e-3  # the same of a level at which things break away: a larger change may move that to another row
-
-
-def rests_on(linear: Linear, bench: Workbench) -> dict[str, dict[str, float]]:
-    """Number -> fixed key -> relative change of the number per percent of the key, gravest first.
-
-    To first order: what the change shows in the log, as the parameters of the fit would make up for it.
-    """
-    _, j = linear.whole()
-    problem = bench.problem
-    values = bench.point.values
-    changes_by_number: dict[str, dict[str, float]] = {p.name: {} for p in problem.robot_parameters}
-    parameter_names = {Key.parse(p.name).name for p in problem.robot_parameters}
-    fixed = [(name, TRIAL_CHANGE) for name in FIXED if Key.parse(name).name not in parameter_names]
-    for name, relative_change in [*fixed, *((name, TRIED_FALL) for name in _of_laws(bench))]:
-        robot = scaled(bench.robot, name, 1.0 + relative_change)
-        if robot is None:
-            continue
-        try:
-            columns_by_piece = bench.change(robot)
-        except OmnidynError:
-            continue
-        if not any(columns.any() for columns in columns_by_piece):
-            continue  # of an axis that never moved
-        step = solved(j, -linear.white(columns_by_piece)[:, 0]) / relative_change * PERCENT
-        for p, value, change in zip(problem.robot_parameters, values, step, strict=False):
-            share = change if p.log else change / value if value else np.nan
-            if np.isfinite(share):
-                changes_by_number[p.name][name] = float(share)
-    return {
-        name: dict(sorted(change_by_key.items(), key=lambda item: -abs(item[1])))
-        for name, change_by_key in changes_by_number.items()
-    }
-
-
-def _of_laws(bench: Workbench) -> list[str]:
-    """What a law that falls with the speed, or bends, has beside Coulomb friction, and the fit takes as it stands."""
-    robot, free = bench.robot, bench.problem.names
-    levels = [key for name in LEVELS for key in expand(name, robot) if falls(key, robot)]
-    speeds = [key.replace(BREAKAWAY, "stribeck_speed").removesuffix("_backward") for key in levels]
-    bends = [key for name in bending_keys(robot) for key in expand(name, robot)]
-    return [key for key in dict.fromkeys((*levels, *speeds, *bends)) if key not in free]

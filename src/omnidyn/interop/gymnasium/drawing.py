@@ -61,8 +61,8 @@ class Scene:
             x, y = size * np.cos(azimuth), size * np.sin(azimuth)
             half = 0.35 * float(np.mean(self.robot.wheels.radii)) + 0.1 * size
             along = half * np.array([-np.sin(azimuth), np.cos(azimuth)])
-            ends = (self._at(pose, x + sign * along[0], y + sign * along[1]) for sign in (-1.0, 1.0))
-            self._line(image, *ends, 0.1 * size, WHEEL)
+            first, last = (self._at(pose, x + sign * along[0], y + sign * along[1]) for sign in (-1.0, 1.0))
+            self._line(image, first, last, 0.1 * size, WHEEL)
         self._line(image, pose[:2], self._at(pose, 0.7 * size, 0.0), 0.08 * size, FRONT)
         return image
 

@@ -211,12 +211,11 @@ def pictures(envs: Environments) -> Iterator[Any]:
     from omnidyn.interop.gymnasium.drawing import Scene
 
     setting, path = envs.setting, envs.numbers.path.astype(float)
-    scene, size = None, 3.0 * float(np.mean(envs.robot.wheels.robot_radius))
+    size = 3.0 * float(np.mean(envs.robot.wheels.robot_radius))
+    scene = Scene(envs.robot, np.zeros(2), float(max((setting.spread or SPREAD[setting.task])[:2])) + size)
     if setting.task == "path":
         low, high = path[:, :2].min(axis=0), path[:, :2].max(axis=0)
         scene = Scene(envs.robot, 0.5 * (low + high), 0.5 * float((high - low).max()) + size, path[:, :2])
-    elif setting.task == "pose":
-        scene = Scene(envs.robot, np.zeros(2), float(max((setting.spread or SPREAD["pose"])[:2])) + size)
     for pose, goal in zip(envs.pose.astype(float), envs.goal.astype(float), strict=True):
         if setting.task == "velocity":
             scene = Scene(envs.robot, pose[:2], 1.0)

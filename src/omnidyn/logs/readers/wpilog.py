@@ -200,8 +200,9 @@ def read_wpilog(path: str | os.PathLike, options: ReadOptions) -> Recording:
         file = WpilogFile(stream, size, source, options)
         file.read()
         notes = [*growth(stream, size), *file.odd.notes]
+    damage = []
     if file.damage:
-        notes.append(cut_short(f"the file is damaged: {file.damage}; {file.count} values before that were read"))
+        damage = [cut_short(f"the file is damaged: {file.damage}; {file.count} values before that were read")]
     schemas = {
         name.removeprefix(SCHEMA_ENTRY): bytes(entry.values[: entry.sizes[0]]).decode("utf-8", "replace")
         for (name, kind), entry in file.entries.items()
@@ -215,7 +216,7 @@ def read_wpilog(path: str | os.PathLike, options: ReadOptions) -> Recording:
             claims.append(TopicClaim(entry.name, stamps, outs, 1))
         topics.append(topic_of(printable(entry.name), printable(entry.kind), stamps, bool(outs), reason))
     tracks = list(tracks_of(_renamed(claims), notes))
-    return Recording(tracks, topics, source, digest.hexdigest(), notes, file.count if file.damage else None)
+    return Recording(tracks, topics, source, digest.hexdigest(), [*notes, *damage], file.count if file.damage else None)
 
 
 def _renamed(claims: list[TopicClaim]) -> list[TopicClaim]:

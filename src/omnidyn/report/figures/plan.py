@@ -30,8 +30,8 @@ def draw_plan(plan: Plan) -> Picture:
         plane.set_title("where it goes")
         thin_out(plane, 5, 5)
         for k in range(put_in.shape[1]):
-            style = {"color": COLOURS[k % len(COLOURS)], "linestyle": LINES[(k // len(COLOURS)) % len(LINES)]}
-            inputs.plot(commands.t, 100.0 * put_in[:, k], linewidth=0.9, label=f"motor {k + 1}", **style)
+            colour, line = COLOURS[k % len(COLOURS)], LINES[(k // len(COLOURS)) % len(LINES)]
+            inputs.plot(commands.t, 100.0 * put_in[:, k], line, linewidth=0.9, color=colour, label=f"motor {k + 1}")
         inputs.set_xlabel("time, s")
         inputs.set_title("input, % of the largest")
         inputs.set_xlim(0.0, float(commands.t[-1]))

@@ -15,8 +15,8 @@ W = 64  # robots in a block
 VELOCITY, POSE, PATH = 0, 1, 2  # tasks
 NEXT_STEP, SAME_STEP, DISABLED = 0, 1, 2  # when an episode that ended begins anew
 
-# Rows of the numbers of a robot, three each: one per axis; then phi of each piece of a step, then those of a speed loop,
-# LOOP per wheel, where there is one, then gain, 3 per wheel
+# Rows of the numbers of a robot, three each: one per axis; then phi of each piece of a step, LOOP per wheel where there
+# is a speed loop, and gain, 3 per wheel
 COULOMB, BREAKAWAY, RATE, PER_MASS, PHI = 0, 3, 6, 9, 12
 # Those of a robot of the implicit engine: forces, and ones in place of 1/M; where phi would begin, the mass that turns
 DAMPING, MASS, FRAME_MASS = 3, 6, 12
@@ -37,10 +37,10 @@ class FixedNumbers(NamedTuple):
     """What does not change from step to step.
 
     task, autoreset: as above. substeps, ticks: of a piece, a number per piece; ticks: of a speed loop, 0 without one.
-    largest: set point of an action of 1 [rad/s], (wheels,). halves: 2 of each substep with poses, or 1, per piece. limit:
-    steps of an episode. lags, shares: a row per piece of a step, by how many steps the voltage that acts in it is late,
-    and its length as a share. averaged: whether measured speeds are means over the step, kept: share of the last one
-    that a low pass keeps. travels: whether means and poses are needed; pushed: whether there are pushes.
+    largest: set point of an action of 1 [rad/s], (wheels,). halves: 2 of each substep with poses, or 1, per piece.
+    limit: steps of an episode. lags, shares: a row per piece of a step, by how many steps the voltage that acts in it
+    is late, and its length as a share. averaged: whether measured speeds are means over the step, kept: share of the
+    last one that a low pass keeps. travels: whether means and poses are needed; pushed: whether there are pushes.
     late, hold [steps]: age of a new pose, and from one to the next. dead: band of the driver, as a share of the largest
     voltage, (wheels,). push: largest wrench [N, N, N m], (3,); interval [steps]: from one to the next, 0: for an
     episode. spread: largest goal or start, (3,). sizes: of the pool (startup, reset, interval). pool: numbers of
@@ -79,8 +79,9 @@ class EnvironmentState(NamedTuple):
     """What changes. robots: their numbers, (blocks, rows, W). twist, pose, goal, push, mean: (blocks, 3, W).
 
     loops: integrals of a speed loop [V], (blocks, wheels, W). past: actions of steps before, (blocks, lags, wheels, W);
-    places: poses of these, (blocks, steps, 3, W). count, episode, member, start (of the path): (blocks, W). key: of the random numbers; ended: whether the episode is over,
-    (blocks, W); rare: whether a block has an episode that ends or begins, (blocks,).
+    places: poses of these, (blocks, steps, 3, W). count, episode, member, start (of the path): (blocks, W). key: of the
+    random numbers; ended: whether the episode is over, (blocks, W); rare: whether a block has an episode that ends or
+    begins, (blocks,).
     """
 
     robots: Any

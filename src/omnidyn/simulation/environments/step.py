@@ -105,7 +105,7 @@ def take_action(out, action, first):
 
 @inlined
 def move(numbers, state, b, now, action, rooms):
-    """A block over a step: all pieces of it. action, acting, volts: (wheels, W); room (6, W); work; the other rooms (3, W)."""
+    """A block over a step, all its pieces. action, acting, volts: (wheels, W); room (6, W); work; the others (3, W)."""
     twist, mean, drive, acting, volts, room, work = rooms
     robots, past = state.robots[b], state.past[b]
     gain, late = first_gain(robots, len(action)), numbers.lags[0] > 0

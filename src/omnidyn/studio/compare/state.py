@@ -8,7 +8,7 @@ from pathlib import Path
 import omnidyn
 from omnidyn.studio import calls
 from omnidyn.studio.calls import LogFile
-from omnidyn.studio.parts import COMPARE, COMPARE_START, DRIFT, ROBOT
+from omnidyn.studio.parts import COMPARE, COMPARE_START, DRIFT
 from omnidyn.studio.session import Session
 from omnidyn.studio.task import Task
 
@@ -26,10 +26,9 @@ class Comparing:
         self._robots, self._fits, self.left_out = ["", ""], list[str](), list[str]()
         session.takers[FIT] = self.add_fit
 
-    def add_fit(self, path: str, name: str) -> None:
-        """Take a robot file that was dropped, under a name that no other has."""
-        self.session.robots[self.session.free_name(name)] = path
-        self.session.changed(ROBOT)
+    async def add_fit(self, path: str, name: str) -> None:
+        """Take a robot file that was dropped, under a name that no other has. Raises InputError for what is none."""
+        await self.session.take_robot(path, name, choose=False)
 
     @property
     def robots(self) -> list[str]:

@@ -24,15 +24,16 @@ class CompareTab:
     def build(self) -> None:
         """Lay it out."""
         page = self.page
+        page.empty("Compare")
         page.part(self._robots, ROBOT)  # apart: a log that was just read takes no choice away
         page.part(self._logs, LOGS)
         page.part(self._start, COMPARE, COMPARE_START, LOGS, ROBOT)
-        page.progress(COMPARE, lambda: self.comparing.last, self.session.workers[COMPARE])
+        page.progress(COMPARE, lambda: self.comparing.last, COMPARE)
         page.part(self._result, COMPARE)
         ui.label("Drift: what changed between fits of one robot").classes("title").props("role=heading aria-level=2")
         page.part(self._fits, ROBOT)
         page.part(self._start_drift, DRIFT, COMPARE_START, ROBOT)
-        page.progress(DRIFT, lambda: self.comparing.last_drift, self.session.workers[COMPARE])
+        page.progress(DRIFT, lambda: self.comparing.last_drift, COMPARE)
         page.part(self._drift, DRIFT)
 
     def _robots(self) -> None:
@@ -40,45 +41,50 @@ class CompareTab:
         comparing, session = self.comparing, self.session
         first, second = comparing.robots
         with ui.row().classes("line"):
-            ui.select(
+            one = ui.select(
                 list(session.robots),
                 value=first or None,
                 label="Robot A",
                 on_change=lambda e: comparing.choose(0, e.value),
-            ).classes("wide robot-a")
-            ui.select(
+            )
+            one.classes("wide robot-a")
+            self.page.mirror(one, COMPARE_START, lambda: comparing.robots[0] or None)
+            other = ui.select(
                 ["", *session.robots],
                 value=second,
                 label="Robot B, if any",
                 on_change=lambda e: comparing.choose(1, e.value),
-            ).classes("wide robot-b")
+            )
+            other.classes("wide robot-b")
+            self.page.mirror(other, COMPARE_START, lambda: comparing.robots[1])
             ui.element("omni-drop").props(f"kind={FIT} words='Drop robot files or fits (.toml), or click'")
 
     def _logs(self) -> None:
         """Which of the logs."""
         comparing, session = self.comparing, self.session
         if len(session.logs) > 1:
-            ui.select(
+            logs = ui.select(
                 {key: log.label for key, log in session.logs.items()},
                 value=[log.key for log in comparing.logs],
                 multiple=True,
                 label="Logs",
                 on_change=lambda e: comparing.choose_logs(e.value),
-            ).classes("wide logs").props("use-chips")
+            )
+            logs.classes("wide logs").props("use-chips")
+            self.page.mirror(logs, COMPARE_START, lambda: [log.key for log in comparing.logs])
 
     def _start(self) -> None:
         comparing = self.comparing
         code = comparing.why_not()
         with ui.row().classes("line"):
             button = ui.button("Compare", on_click=lambda: self.session.start(comparing.run()))
-            button.props("outline no-caps id=compare").set_enabled(not code and not comparing.last.running)
+            button.props("unelevated no-caps id=compare").set_enabled(not code and not comparing.last.running)
             if code:
                 ui.label(WHY[code]).classes("text quiet").props("id=why-compare")
 
     def _result(self) -> None:
         task = self.comparing.last
-        if task.error:
-            verdict("error", task.error, "compare-verdict")
+        self.page.stopped(task, "compare-verdict", self.comparing.run)
         if task.result is None:
             return
         result = task.result
@@ -107,13 +113,15 @@ class CompareTab:
             )
             return
         with ui.row().classes("line"):
-            ui.select(
+            fits = ui.select(
                 comparing.files,
                 value=comparing.fits,
                 multiple=True,
                 label="Fits, the oldest first",
                 on_change=lambda e: comparing.choose_fits(e.value),
-            ).classes("wide fits").props("use-chips")
+            )
+            fits.classes("wide fits").props("use-chips")
+            self.page.mirror(fits, COMPARE_START, lambda: comparing.fits)
         with ui.row().classes("line"):
             for name in comparing.files:
                 ui.link(name, f"/robot/{quote(name)}").props("download")
@@ -132,8 +140,7 @@ class CompareTab:
 
     def _drift(self) -> None:
         task = self.comparing.last_drift
-        if task.error:
-            verdict("error", task.error, "drift-verdict")
+        self.page.stopped(task, "drift-verdict", self.comparing.run_drift)
         if task.result is None:
             return
         verdict(task.result["severity"], task.result["verdict"], "drift-verdict")

@@ -44,7 +44,7 @@ class Driving:
             elif kind == "numbers" and self.robot is not None:
                 self.robot |= value
             elif kind == "trouble":
-                self.trouble = value
+                self.trouble = self.session.shown(value)
             elif kind == "recorded":
                 self.session.add_log(value["path"], Path(value["path"]).name)
             self.session.changed(NUMBERS if kind == "numbers" else DRIVE)
@@ -54,7 +54,7 @@ class Driving:
                 "drive", {"robot": self.session.robot_path, "folder": str(folder)}, listen
             )
         except JobError as error:
-            self.trouble = str(error)
+            self.trouble = self.session.shown(str(error))
         except CancelledError:
             pass
         self.running = self.recording = False

@@ -42,7 +42,7 @@ class DriveTab:
                     on_click=lambda: drive.send({"record": not drive.recording}),
                 ).props("outline no-caps id=record")
             else:
-                ui.button("Drive", on_click=self._start).props("outline no-caps id=drive")
+                ui.button("Drive", on_click=self._start).props("unelevated no-caps id=drive")
             if any(Path(log.path).name.startswith("drive-") for log in session.logs.values()):
                 ui.button("Fit the recording", on_click=lambda: self.page.go("Fit")).props("outline no-caps id=to-fit")
             if not drive.running:

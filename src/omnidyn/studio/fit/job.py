@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from omnidyn.logs.read_log import recorded_log
 from omnidyn.model.keys import EMF, ROTOR, TORQUE, Key, find_key, in_words, unit
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
+from omnidyn.statement import ERROR, SEVERITIES, Statement
 from omnidyn.studio.job import Tell, options_of, robot_of, timed, write_free_runs
 from omnidyn.studio.series import SERIES
 
@@ -69,7 +70,7 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     omnidyn.save_robot(estimate.robot, folder / "robot.toml")
     _ = result.after  # what follows a fit is made here, where its progress is heard
     listen(Report("drawing"))
-    table = _numbers(estimate)
+    table = _with_before(_numbers(estimate), robot)
     warnings = [{"severity": w.severity, "text": str(w)} for w in dict.fromkeys(estimate.warnings)]
     (folder / "numbers.csv").write_text(_csv(table), "utf-8")
     (folder / "warnings.csv").write_text(
@@ -78,6 +79,7 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     shown = {
         "verdict": result.headline,
         "failed": bool(result.failures),
+        "severity": ERROR if result.failures else gravest(result.outcome()),
         "interrupted": result.interrupted,
         "numbers": {"head": list(table.head), "rows": [list(row) for row in table.rows]},
         "values": {name: float(value) for name, value in estimate.value.items()},
@@ -88,6 +90,11 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     }
     shown["report"] = _write_report(result, request, folder / "report.html")
     return shown
+
+
+def gravest(statements: Sequence[Statement]) -> str:
+    """The severity of the gravest statement."""
+    return min((statement.severity for statement in statements), key=SEVERITIES.index)
 
 
 def _numbers(estimate: Estimate) -> Table:
@@ -108,6 +115,21 @@ def _numbers(estimate: Estimate) -> Table:
         for name, value in estimate.value.items()
     ]
     return Table(("number", "key", "value", "std error", "95 % interval", "unit", ""), rows)
+
+
+def _with_before(table: Table, robot: Robot | None) -> Table:
+    """The table, and beside each number what the robot had before the fit."""
+    before = [_number_of(row[1], robot) for row in table.rows]
+    rows = [(*row[:5], old, *row[5:]) for row, old in zip(table.rows, before, strict=True)]
+    return replace(table, head=(*table.head[:5], "before", *table.head[5:]), rows=rows)
+
+
+def _number_of(name: str, robot: Robot | None) -> str:
+    """A number of a robot, "" for none."""
+    try:
+        return f"{Key.parse(name).get(robot):.5g}" if robot is not None and find_key(name) else ""
+    except (OmnidynError, TypeError, ValueError):
+        return ""
 
 
 def _csv(table: Table) -> str:

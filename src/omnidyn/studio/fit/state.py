@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import shutil
 from typing import Any
 
 from omnidyn.studio import calls
+from omnidyn.studio.calls import LogFile
 from omnidyn.studio.parts import FIT, FREE, ROBOT
 from omnidyn.studio.session import Session
 from omnidyn.studio.task import Task
 from omnidyn.studio.worker import CancelledError, JobError
+
+FITTED, HELD_OUT, LEFT_OUT = "fit", "hold out", "leave out"  # what a log is used for
 
 
 class Fitting:
@@ -19,7 +21,7 @@ class Fitting:
     def __init__(self, session: Session) -> None:
         self.session, self.last = session, Task()
         self.fits: dict[str, Task] = {}
-        self._held_out: list[str] = []
+        self._held_out, self._left_out = list[str](), list[str]()
         self.choices: dict[str, Any] = {"default": [], "others": []}  # what can be free of the robot `_choices_of`
         self.free: list[str] = []
         self._choices_of = ""
@@ -27,12 +29,28 @@ class Fitting:
     @property
     def held_out(self) -> list[str]:
         """Keys of logs that are predicted, not fitted."""
-        return [key for key in self._held_out if key in self.session.logs]
+        return [log.key for log in self.logs if log.key in self._held_out]
 
     def hold_out(self, keys: list[str]) -> None:
         """Predict these logs, do not fit them."""
         self._held_out = keys
         self.session.changed(FIT)
+
+    @property
+    def logs(self) -> list[LogFile]:
+        """The logs that are fitted or predicted."""
+        return [log for key, log in self.session.logs.items() if key not in self._left_out]
+
+    def use_of(self, key: str) -> str:
+        """What a log is used for: FITTED, HELD_OUT or LEFT_OUT."""
+        return LEFT_OUT if key in self._left_out else HELD_OUT if key in self._held_out else FITTED
+
+    def use(self, key: str, use: str) -> None:
+        """Use a log so."""
+        if use != self.use_of(key):
+            self._held_out = [*(k for k in self._held_out if k != key), *[key] * (use == HELD_OUT)]
+            self._left_out = [*(k for k in self._left_out if k != key), *[key] * (use == LEFT_OUT)]
+            self.session.changed(FIT)
 
     def want_choices(self) -> None:
         """See to it that the choices are those of the robot that is chosen."""
@@ -41,17 +59,21 @@ class Fitting:
             self.session.start(self._choose(self._choices_of))
 
     async def _choose(self, robot: str) -> None:
-        with contextlib.suppress(JobError, CancelledError):
-            choices = await self.session.workers["log"].run("free_keys", {"robot": robot}, lambda kind, value: None)
-            if robot == self._choices_of:
-                self.choices, self.free = choices, [key for key, _ in choices["default"]]
-                self.session.changed(FREE, FIT)
+        try:
+            choices = await self.session.workers["log"].ask("free_keys", {"robot": robot})
+        except (JobError, CancelledError):
+            self._choices_of = ""  # asked again with the next change; until then `identify` chooses
+            return
+        if robot == self._choices_of:
+            self.choices, self.free = choices, [key for key, _ in choices["default"]]
+            self.session.changed(FREE, FIT)
 
     def set_free(self, keys: list[str]) -> None:
         """Fit these numbers, in the order in which they are offered."""
         offered = [key for group in ("default", "others") for key, _ in self.choices[group]]
-        self.free = sorted(keys, key=offered.index)
-        self.session.changed(FIT)
+        if (free := sorted(keys, key=offered.index)) != self.free:
+            self.free = free
+            self.session.changed(FIT)
 
     @property
     def free_keys(self) -> tuple[str, ...]:
@@ -64,7 +86,7 @@ class Fitting:
             return "no_log", ""
         if not self.session.robot_path:
             return "no_robot", ""
-        for log in self.session.logs.values():
+        for log in self.logs:
             if log.error:
                 return "unread", f"{log.label}: {log.error}"
             if log.result is None:
@@ -74,7 +96,7 @@ class Fitting:
                 return "unfit", f"{log.label}: {log.result['verdict']}"
         if not self.free and self.choices["default"]:
             return "nothing_free", ""
-        return ("all_held_out", "") if len(self.held_out) == len(self.session.logs) else ("", "")
+        return ("all_held_out", "") if len(self.held_out) == len(self.logs) else ("", "")
 
     async def run(self, added: str = "") -> None:
         """Fit the robot to the logs. added: a number that is free beside the others."""
@@ -86,7 +108,7 @@ class Fitting:
                 self.choices["others"].append([added, added])
             self.session.changed(FREE)
         free = self.free_keys
-        logs, held_out = [*self.session.logs.values()], [self.session.logs[key] for key in self.held_out]
+        logs, held_out = self.logs, [self.session.logs[key] for key in self.held_out]
         command, python = calls.fit(logs, held_out, self.session.robot_path, free)
         self.last.end(self.session)
         self.last = fit = Task(command=command, python=python)

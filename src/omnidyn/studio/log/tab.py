@@ -24,13 +24,14 @@ class LogTab:
         """Lay it out."""
         with ui.row().classes("line"):
             ui.element("omni-drop")
-            ui.button("Use the example log", on_click=self._example).props("outline no-caps id=example")
+            ui.button("Use the example log", on_click=self.page.busy(self.session.example)).props(
+                "outline no-caps id=example"
+            )
+        self.page.empty("Log")
         self.page.part(self._choice, LOGS)
         self.page.part(self._progress, LOGS, PROGRESS)
+        self.page.next_step("Log")
         self.page.part(self._content, LOGS)
-
-    async def _example(self) -> None:
-        await self.session.example()
 
     def _log(self) -> LogFile | None:
         """The log that this page shows."""
@@ -40,9 +41,6 @@ class LogTab:
     def _choice(self) -> None:
         log = self._log()
         if log is None:
-            ui.label(
-                "No log yet. Drop a file here: CSV, Parquet, a ROS bag, MATLAB, WPILOG. It stays on this machine."
-            ).classes("quiet")
             return
         with ui.row().classes("line"):
             names = {key: other.label for key, other in self.session.logs.items()}
@@ -66,6 +64,10 @@ class LogTab:
             return
         if log.error:
             verdict("error", log.error)
+        if log.ended:
+            ui.button("Run again", on_click=lambda: self.session.start(self.session.check(log))).props(
+                "outline no-caps id=check-again"
+            )
         if log.result is not None:
             verdict(log.result["severity"], log.result["verdict"])
         if log.series:
@@ -106,7 +108,7 @@ class LogTab:
             if log.other:
                 field = ui.number("added to its times [s]", value=round(log.offset, 6), step=0.01, format="%.6f")
                 field.props("dense for=offset").on("change", lambda: self._move(log, field.value))
-                ui.button("Align", on_click=lambda: self.session.start(self.session.align(log))).props(
+                ui.button("Align", on_click=self.page.busy(lambda: self.session.align(log))).props(
                     "outline no-caps id=align"
                 )
         if log.other and log.aligned is not None:
@@ -178,10 +180,12 @@ class LogTab:
                     column_row(row)
             trouble = ui.label().classes("text error-text")
 
-            async def apply() -> None:
-                trouble.text = await self.session.map_columns(log, [r for r in rows if r["component"] != UNUSED])
+            async def apply() -> str:
+                return await self.session.map_columns(log, [r for r in rows if r["component"] != UNUSED])
 
             with ui.row().classes("line"):
-                ui.button("Read the log this way", on_click=apply).props("outline no-caps id=apply-columns")
+                ui.button("Read the log this way", on_click=self.page.busy(apply, trouble)).props(
+                    "outline no-caps id=apply-columns"
+                )
                 if log.map:
                     ui.link("Save this map", f"/log/{log.key}/map").props("download")

@@ -37,13 +37,13 @@ class Drive extends HTMLElement {
     this.state = make('div', left, { className: 'state' });
     this.pads(make('div', left, { className: 'pads' }));
     const unit = this.robot.unit;
-    make('h3', right, { textContent: 'Keys' });
+    make('h2', right, { textContent: 'Keys' });
     this.level = this.slider(right, `level of a key`, unit, 0, this.robot.limit, Math.min(this.robot.limit, this.robot.limit / 2), () => this.send(), 'level');
     this.note = make('div', right, { className: 'state', id: 'breakaway' });
-    make('h3', right, { textContent: 'Each wheel' });
+    make('h2', right, { textContent: 'Each wheel' });
     this.robot.wheels.forEach((_, k) => this.slider(right, `wheel ${k + 1}`, unit, -this.robot.limit, this.robot.limit, 0,
       (v) => { this.offset[k] = v; this.give({ offset: this.offset }); }, `wheel-${k + 1}`));
-    make('h3', right, { textContent: 'Change while it moves' });
+    make('h2', right, { textContent: 'Change while it moves' });
     this.varied = {};
     for (const [kind, [words, of]] of Object.entries(VARIED)) {
       const act = (v) => this.give({ vary: { [kind]: v } }), names = this.robot.names[kind], range = this.robot.ranges[kind];

@@ -16,6 +16,7 @@ from omnidyn.studio.series import SERIES
 from omnidyn.studio.track.job import DRAWN
 from omnidyn.studio.track.state import Tracks
 
+UNITS = {"_rad_s": "rad/s", "_rad": "rad", "_m": "m", "_s": "s"}  # of the names of sizes
 WHY = {
     "no_robot": "Choose a robot first.",
     "no_controller": "Choose a controller first.",
@@ -35,7 +36,7 @@ class TrackTab:
         self.page.part(self._path, PATH)
         self.page.part(self._loop, PATH, ROBOT)
         self.page.part(self._start, TRACK, TRACK_START, PATH, ROBOT)
-        self.page.progress(TRACK, lambda: self.tracks.last, self.session.workers[TRACK])
+        self.page.progress(TRACK, lambda: self.tracks.last, TRACK)
         self.page.part(self._result, TRACK)
 
     def _path(self) -> None:
@@ -54,7 +55,7 @@ class TrackTab:
             for name, value in OPTIONS.get(tracks.path, {}).items():
                 given = tracks.options[tracks.path]
                 ui.input(
-                    name,
+                    _label(name),
                     value=given.get(name, ""),
                     placeholder="" if value is None else f"{value}",
                     on_change=_into(given, name),
@@ -79,13 +80,15 @@ class TrackTab:
         """The controllers, the sensors, and the robot that is driven in truth."""
         tracks = self.tracks
         with ui.row().classes("line"):
-            ui.select(
+            controllers = ui.select(
                 tracks.controller_names,
                 value=tracks.controllers,
                 multiple=True,
                 label="Controllers side by side",
                 on_change=lambda e: tracks.control(e.value),
-            ).classes("wide controllers").props("use-chips")
+            )
+            controllers.classes("wide controllers").props("use-chips")
+            self.page.mirror(controllers, TRACK_START, lambda: tracks.controllers)
             ui.select(
                 ["", *self.session.robots],
                 value=tracks.plant if tracks.plant in self.session.robots else "",
@@ -93,24 +96,23 @@ class TrackTab:
                 on_change=lambda e: setattr(tracks, "plant", e.value),
             ).classes("wide plant")
             ui.input(
-                "Sensors, such as encoder:2048,filter:30ms",
+                "Sensors",
                 value=tracks.sensors,
-                placeholder="as the robot file says",
+                placeholder="such as encoder:2048,filter:30ms",
                 on_change=lambda e: setattr(tracks, "sensors", e.value or ""),
-            ).classes("wide").props("stack-label")
+            ).classes("wide").props("stack-label hint='empty: as the robot file says'")
 
     def _start(self) -> None:
         code = self.tracks.why_not()
         with ui.row().classes("line"):
             button = ui.button("Track", on_click=lambda: self.session.start(self.tracks.run()))
-            button.props("outline no-caps id=track").set_enabled(not code and not self.tracks.last.running)
+            button.props("unelevated no-caps id=track").set_enabled(not code and not self.tracks.last.running)
             if code:
                 ui.label(WHY[code]).classes("text quiet").props("id=why-track")
 
     def _result(self) -> None:
         task = self.tracks.last
-        if task.error:
-            verdict("error", task.error, "track-verdict")
+        self.page.stopped(task, "track-verdict", self.tracks.run)
         if task.result is None:
             return
         result = task.result
@@ -125,6 +127,12 @@ class TrackTab:
                 ui.link("Drawn path (CSV)", f"/track/{DRAWN}").props("download")
         self.page.plot(task.series[SERIES], [], "track-signals.png")
         self.page.calls(task.command, task.python, "call-track")
+
+
+def _label(name: str) -> str:
+    """The name of a size as a page has it: words, and the unit."""
+    end = next((end for end in UNITS if name.endswith(end)), "")
+    return f"{name.removesuffix(end)} [{UNITS[end]}]" if end else name
 
 
 def _into(given: dict[str, str], name: str) -> Callable[[Any], None]:

@@ -143,11 +143,11 @@ def _lag(statement: Statement) -> str:
 
 
 def _lag_remedy(statement: Statement) -> str:
-    """A latency in the mapping; of poses, none: a controller needs to know how late they are."""
+    """A latency in the mapping; none of poses: a controller needs to know how late they are."""
     if statement.numbers["late"] == "pose":
         return (
-            "leave it: identify fits how late poses are and writes it into [log] of the robot file; say under [sensors] "
-            "what feeds the loop"
+            "leave it: identify fits how late poses are and writes it into [log] of the robot file; say under "
+            "[sensors] what feeds the loop"
         )
     return f"move its times back by {1e3 * abs(statement.numbers['seconds']):.3g} ms: latency in the mapping"
 

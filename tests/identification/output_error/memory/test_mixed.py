@@ -6,7 +6,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from omnidyn.identification.output_error.memory.autoregression import autoregression
-from omnidyn.identification.output_error.memory.moving import _mixed_likelihood, mixed, partials
+from omnidyn.identification.output_error.memory.beside_white import _mixed_likelihood, mixed, partials
 
 
 def noise_and_memory(rows, z, share, seed):

@@ -12,7 +12,7 @@ from omnidyn.identification.output_error.linear.rounded_inputs import effects
 from omnidyn.identification.output_error.linear.rows import FitRows, Linear, noise_models
 from omnidyn.identification.output_error.memory.autoregression import _without_empty_axes
 from omnidyn.identification.output_error.problem import problem as module
-from omnidyn.identification.output_error.problem.problem import ROWS, bounded
+from omnidyn.identification.output_error.problem.bounded import ROWS, bounded
 from omnidyn.identification.structure.misfit import Gram
 
 

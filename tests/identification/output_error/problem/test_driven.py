@@ -5,7 +5,8 @@ import pytest
 
 from benchmarks.wrong_worlds.log import AR, COUNTS, SPEEDS, TICKS, TWIST, Case, Setup, logged, robot_of
 from benchmarks.wrong_worlds.world import World
-from omnidyn.identification.output_error.problem.nuisances import least_that_drove, nuisance_parameters
+from omnidyn.identification.output_error.problem.driving_voltages import least_that_drove
+from omnidyn.identification.output_error.problem.nuisances import nuisance_parameters
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.model.drive import Drive
 from tests.support import real_logs as real

@@ -28,8 +28,9 @@ from omnidyn.identification.output_error.linear.rows import (
     noise_models,
     with_priors,
 )
+from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
-from omnidyn.identification.output_error.problem.problem import Problem, bounded
+from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.solver import Normal, Solution
 from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 from omnidyn.model.actuation import DEAD_BAND

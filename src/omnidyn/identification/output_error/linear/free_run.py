@@ -17,8 +17,9 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.linear.blocks import BLOCKS, BlockProducts
 from omnidyn.identification.output_error.linear.rows import FitRows, Linear, noise_models
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.nuisances import TRAVELS
-from omnidyn.identification.output_error.problem.problem import Column, Point, Problem, bounded
+from omnidyn.identification.output_error.problem.problem import Column, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 

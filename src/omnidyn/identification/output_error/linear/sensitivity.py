@@ -13,8 +13,9 @@ from omnidyn.identification.output_error.linear.rows import FitRows, Linear, sol
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.memory.whitening import Weighed
+from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.parameters import robot_parameter
-from omnidyn.identification.output_error.problem.problem import Point, Problem, bounded
+from omnidyn.identification.output_error.problem.problem import Point, Problem
 
 TRIAL_CHANGE = 0.01  # relative change of a fixed number, either way is alike
 

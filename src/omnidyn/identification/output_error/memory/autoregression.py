@@ -22,15 +22,9 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel
+from omnidyn.identification.output_error.memory.beside_white import coefficients, mixed, told_by_many
 from omnidyn.identification.output_error.memory.innovations import gains, innovations
-from omnidyn.identification.output_error.memory.moving import (
-    Moving,
-    coefficients,
-    mixed,
-    new_while_moving,
-    told_by_many,
-    while_moving,
-)
+from omnidyn.identification.output_error.memory.moving import Moving, new_while_moving, while_moving
 
 ORDERS = 10.0  # times log10 of the number of rows: the highest order that is tried
 SHARE = 0.1  # of the rows that may be coefficients

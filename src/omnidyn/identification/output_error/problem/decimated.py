@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.problem.problem import ROWS, Parts, Piece, Problem, bounded
+from omnidyn.identification.output_error.problem.bounded import ROWS, bounded
+from omnidyn.identification.output_error.problem.problem import Parts, Piece, Problem
 from omnidyn.identification.output_error.problem.record import SHORTEST, Record
 
 LONGEST = 0.02  # [s] of a row that is made of several: most robots answer more slowly

@@ -13,6 +13,7 @@ from omnidyn.errors import InputError
 from omnidyn.model.keys import BREAKAWAY, CENTRE, EMF, FRICTION, ROTOR, TORQUE, WHEEL, Key, expand
 from omnidyn.model.robot import Robot
 
+LEAST_LATENCY, MOST_LATENCY = -0.1, 0.3  # [s] of a drive or sensor
 FRICTION_LIMIT = 1e6  # what a robot file takes
 AT = "@"  # KEY@GROUP is the number that a group has for itself
 EFFICIENCY = "motor.gear_efficiency"  # of which nothing is above 1

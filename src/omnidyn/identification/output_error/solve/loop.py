@@ -17,8 +17,8 @@ from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.methods import FREE, REST
 from omnidyn.identification.output_error.engines.kinds import kind_with
 from omnidyn.identification.output_error.engines.speed_loop import SLOW_LOOP
-from omnidyn.identification.output_error.problem.nuisances import LEAST_LATENCY, MOST_LATENCY, TRAVELS
-from omnidyn.identification.output_error.problem.parameters import Parameter
+from omnidyn.identification.output_error.problem.nuisances import TRAVELS
+from omnidyn.identification.output_error.problem.parameters import LEAST_LATENCY, MOST_LATENCY, Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import measured_twists

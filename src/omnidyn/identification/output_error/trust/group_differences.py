@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.trust.resampling import (
     widening_of_std,
 )
 from omnidyn.identification.output_error.trust.uncertainty import Trust
-from omnidyn.identification.steady.study_table import Difference
+from omnidyn.identification.steady.group_numbers import Difference
 
 
 def differences(

@@ -15,8 +15,9 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.linear.blocks import BlockProducts
 from omnidyn.identification.output_error.linear.rows import FitRows, Linear
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.decimated import Decimated
-from omnidyn.identification.output_error.problem.problem import Parts, Point, bounded
+from omnidyn.identification.output_error.problem.problem import Parts, Point
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
 from omnidyn.identification.structure.tails import as_counted

@@ -172,7 +172,7 @@ def recording_of(variables: Variables) -> Recording:
         ]
     if not tracks:
         raise _nothing(variables)
-    return Recording(tracks, topics, variables.source, variables.sha256, notes)
+    return Recording(tracks, topics, variables.source, variables.sha256, [*notes])
 
 
 def _clock(name: str, length: int, times: Mapping[str, FloatArray]) -> str | None:

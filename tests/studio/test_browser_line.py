@@ -1,0 +1,154 @@
+"""The line Log, Robot, Fit, Drive, Track, Compare in a real browser, and what never goes silent."""
+
+import os
+import signal
+import subprocess
+
+import omnidyn
+from tests.support.pages import choose_axebot, command, drop, laid_out, load_again, numbers, shown, tab, verdict
+from tests.support.pages import write_log as written
+
+
+def states(page):
+    """Tab -> the mark and the words on it."""
+    lines = [text.split("\n") for text in page.get_by_role("tab").all_inner_texts()]
+    return {name: (mark, words) for name, mark, words in lines}
+
+
+def workers(studio):
+    """The processes that do jobs."""
+    return [int(pid) for pid in subprocess.check_output(["pgrep", "-P", str(studio.process.pid)]).split()]
+
+
+def primary(page):
+    """The words of the primary buttons that are seen."""
+    return page.locator(".q-btn--unelevated:visible:not(.q-btn-toggle .q-btn)").all_inner_texts()
+
+
+def test_the_line_says_what_is_done_and_what_comes_next_and_the_address_keeps_the_tab(browser, tmp_path):
+    _, page = browser.start()
+    assert states(page)["Log"] == ("○", "no log yet")
+    assert states(page)["Fit"] == ("–", "needs a log")
+    assert "Next: drop a log" in page.inner_text("#next")
+    assert page.locator(".empty li").count() == 3
+    assert page.evaluate("document.querySelector('.empty img').naturalWidth") > 100
+    shown(page, "empty")
+    for name in ("Fit", "Compare"):
+        tab(page, name)
+        page.wait_for_selector(".empty")
+        assert len(primary(page)) == 1
+    drop_on = written(tmp_path / "log.csv", 12.0)
+    tab(page, "Log")
+    page.wait_for_selector("#example")
+    drop(page, drop_on)
+    verdict(page)
+    assert primary(page) == ["Next: Robot"]
+    page.click("#next-log")
+    page.get_by_label("Choose axebot", exact=True).click()
+    page.click("#next-robot")
+    page.click("#fit:not([disabled])")
+    words = verdict(page, "#fit-verdict")
+    page.wait_for_function("document.querySelector('.tabs, .q-tabs').innerText.includes('fitted')")
+    assert states(page)["Fit"] == ("✓", "fitted")
+    assert page.url.endswith("?tab=fit")
+    page.reload()
+    assert verdict(page, "#fit-verdict") == words
+    page.set_viewport_size({"width": 420, "height": 900})
+    assert page.evaluate("(s => s.scrollWidth - s.clientWidth)(document.querySelector('.scroll'))") <= 0  # cards
+    page.set_viewport_size({"width": 1400, "height": 900})
+    page.go_back()
+    page.get_by_text("Robots of this session").wait_for()
+    assert page.url.endswith("?tab=robot")
+    page.go_forward()
+    assert verdict(page, "#fit-verdict") == words
+
+
+def test_a_process_that_ends_is_said_and_run_again(browser, tmp_path):
+    path = written(tmp_path / "long.csv", 60.0)
+    studio, page = browser.start(path)
+    verdict(page)
+    choose_axebot(page)
+    page.click("#fit:not([disabled])")
+    page.wait_for_function("(document.querySelector('#fit-progress')?.innerText || '').includes('fitting')")
+    for pid in workers(studio):
+        os.kill(pid, signal.SIGKILL)
+    page.wait_for_selector("#fit-stopped-again")
+    assert "the process of this job ended before its result; got signal SIGKILL" in verdict(page, "#fit-stopped")
+    page.wait_for_function("document.querySelector('.q-tabs').innerText.includes('stopped')")
+    page.click("#fit-stopped-again")
+    said = command("identify", path, "--robot", "axebot", "--json")[0]
+    assert verdict(page, "#fit-verdict") == laid_out(said["verdict"])
+    page.click("#fit:not([disabled])")
+    page.wait_for_selector("#cancel-fit")
+    page.click("#cancel-fit")
+    page.wait_for_selector("#fit-stopped-cancelled, #fit-verdict")  # before there was anything, or the best so far
+    tab(page, "Robot")
+    page.get_by_text("Describe another robot").click()
+    page.click("#make-robot")
+    page.wait_for_selector("#make-robot .q-spinner")  # it shows that it works
+    page.get_by_text("my-robot.toml").first.wait_for()
+
+
+def test_two_pages_show_the_same_choices_and_a_bad_log_is_left_out(browser, tmp_path):
+    good, other, broken = (tmp_path / name for name in ("good.csv", "other.csv", "broken.csv"))
+    written(good, 12.0)
+    written(other, 12.0, 2)
+    broken.write_text("t_s,vx_m_s\n0,1\n1,abc\n2,3\n", "utf-8")
+    studio, page = browser.start(good, other, broken)
+    page.wait_for_selector("#verdict")
+    choose_axebot(page)
+    second = browser.open(studio)
+    tab(second, "Fit")
+    page.get_by_text("broken.csv: ").wait_for()
+    assert page.is_disabled("#fit")
+    page.get_by_label("use of broken.csv").get_by_text("leave out").click()
+    page.get_by_label("use of other.csv").get_by_text("hold out").click()
+    for name, use in (("broken.csv", "leave out"), ("other.csv", "hold out")):
+        second.get_by_label(f"use of {name}").locator(".bg-primary").get_by_text(use).wait_for()
+    page.locator(".free .q-chip__icon--remove").last.click()
+    second.wait_for_function("document.querySelectorAll('.free .q-chip').length === 5")
+    page.wait_for_function("document.querySelectorAll('.free .q-chip').length === 5")
+    second.click("#fit:not([disabled])")
+    words = verdict(second, "#fit-verdict")
+    assert verdict(page, "#fit-verdict") == words
+    free = [w for key in list(numbers(page))[:5] for w in ("--free", key)]
+    said = command("identify", good, other, "--hold-out", other, "--robot", "axebot", *free, "--json")[0]
+    assert {key: cell for key, cell in numbers(page).items() if key in said["parameters"]} == {
+        key: f"{number['value']:.5g}" for key, number in said["parameters"].items()
+    }
+
+
+def test_robots_are_seen_edited_renamed_and_removed_and_a_map_is_none(browser, tmp_path):
+    map_file = tmp_path / "log-columns.toml"
+    log = written(tmp_path / "log.csv", 4.0)
+    assert command("check", log, "--save-map", map_file)[1] == 0
+    heavy = tmp_path / "heavy.toml"
+    omnidyn.save_robot(omnidyn.load_robot("axebot"), heavy)
+    _, page = browser.start(log)
+    tab(page, "Robot")
+    page.get_by_label("Choose axebot", exact=True).click()
+    page.wait_for_function("document.querySelector('.q-tabs').innerText.includes('axebot')")
+    drop(page, map_file)
+    page.get_by_text("was not taken").wait_for()
+    assert "400" in browser.complaints.pop()  # what the browser says of the refusal
+    assert states(page)["Robot"] == ("✓", "axebot")
+    load_again(page)
+    drop(page, heavy)
+    page.wait_for_function("document.querySelector('.q-tabs').innerText.includes('heavy.toml')")
+    page.get_by_label("View or edit heavy.toml").click()
+    field = page.get_by_label("File of heavy.toml")
+    text = field.input_value()
+    assert "mass_kg = 1.5" in text
+    field.fill(text.replace("mass_kg = 1.5", "mass_kg = -1.5"))
+    page.click("#keep-robot")
+    page.get_by_text("mass_kg").last.wait_for()
+    field.fill(text.replace("mass_kg = 1.5", "mass_kg = 2.5"))
+    page.get_by_label("keep as").fill("heavier")
+    page.click("#keep-robot")
+    page.get_by_label("Remove heavier.toml").wait_for()
+    assert page.get_by_label("Remove heavy.toml").count() == 0
+    page.get_by_label("View or edit heavier.toml").click()
+    assert "mass_kg = 2.5" in page.get_by_label("File of heavier.toml").input_value()
+    page.get_by_label("Remove heavier.toml").click()
+    page.wait_for_function("!document.querySelector('.panels').innerText.includes('heavier.toml')")
+    assert states(page)["Robot"] == ("○", "none chosen")
