@@ -155,11 +155,11 @@ def table_of(robots: dict[str, tuple[Numbers, str]], seed: int) -> Table:
         table.add("0 cells", count[name] == 0, robot="all", sensors=name, lost=f"{count[name]} of {total}")
     silent, late, nominal, wrong = swings.tolist()
     cells = len(robots) * len(OURS)
-    words = f"{silent} of {late}"
-    table.add("0 cells", silent == 0, robot="all", sensors="late, 5 mm off, silent for a second", lost=words)
+    share = f"{silent} of {late}"
+    table.add("0 cells", silent == 0, robot="all", sensors="late, 5 mm off, silent for a second", lost=share)
     table.add("0 cells", nominal == 0, robot="all", sensors="nominal and said to swing", lost=f"{nominal} of {cells}")
-    words = f"{wrong} of {cells * (len(CONDITIONS) - 2)}"
-    table.add("1 cell", wrong <= 1, robot="all", sensors="wrong model, little off, said to swing", lost=words)
+    share = f"{wrong} of {cells * (len(CONDITIONS) - 2)}"
+    table.add("1 cell", wrong <= 1, robot="all", sensors="wrong model, little off, said to swing", lost=share)
     return table
 
 

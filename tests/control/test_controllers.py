@@ -28,7 +28,8 @@ from omnidyn.control.controllers import (
 )
 from omnidyn.control.feedforward import Feedforward
 from omnidyn.control.mpc.controller import Mpc
-from omnidyn.control.pid import Pid
+from omnidyn.control.pid import Pid, summed
+from omnidyn.control.pid_batch import summed_each
 from omnidyn.control.speed_loop import SpeedLoop
 from omnidyn.errors import InputError, Terminated
 from omnidyn.model.drive import Drive
@@ -376,6 +377,14 @@ def test_the_law_of_pid_over_arrays_is_that_of_each_robot(name):
         assert effort.current[index] == pytest.approx(alone.current, rel=1e-12, abs=1e-12)
         _, met = pid.volts.within(alone)
         assert met == ("voltage",) * bool(volts[index]) + ("current",) * bool(current[index])
+
+
+def test_sums_of_many_loops_have_the_bits_of_each():
+    rng = np.random.default_rng(0)
+    totals, more = rng.normal(size=(2, 500, 3))
+    weights = np.minimum(1.0, rng.uniform(0.0, 2.0, (500, 3)))
+    rows = zip(totals.ravel().tolist(), more.ravel().tolist(), weights.ravel().tolist(), strict=True)
+    assert summed_each(totals, more, weights).ravel().tolist() == [summed(*row) for row in rows]
 
 
 def test_a_step_of_pid_costs_no_more_than_one_that_looks_ahead():

@@ -143,7 +143,7 @@ def _lag(statement: Statement) -> str:
 
 
 def _lag_remedy(statement: Statement) -> str:
-    """A latency in the mapping; of poses, none: a controller needs to know how late they are."""
+    """A latency in the mapping; none of poses: a controller needs to know how late they are."""
     if statement.numbers["late"] == "pose":
         return (
             "leave it: identify fits how late poses are and writes it into [log] of the robot file; say under "
