@@ -157,7 +157,7 @@ def test_every_kind_of_key_reaches_its_place(tmp_path):
         duration=0.4,
         delay=1,
         noise=0.01,
-        seed=5,
+        rng=5,
     )
     assert measured["rmse_position_m"] == tracking.rmse_position
     assert measured["worst_position_m"] == tracking.worst_position

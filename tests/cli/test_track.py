@@ -60,7 +60,7 @@ def test_the_numbers_are_those_of_the_library(call):
     _, out, _ = call(
         "axebot", *SHORT, "--noise", "0.01", "--seed", "3", "--delay", "1", "--skip", "0.2", "--sensors", spec, "--json"
     )
-    options = {"noise": 0.01, "seed": 3, "delay": 1, "skip": 0.2, "sensors": spec}
+    options = {"noise": 0.01, "rng": 3, "delay": 1, "skip": 0.2, "sensors": spec}
     mine = omnidyn.track(omnidyn.load_robot("axebot"), "eight:period_s=4", "pid", duration=2.0, **options)
     assert json.loads(out)["sensors"] == "encoder:2048,pose:60Hz,40ms,dropouts:5%,jitter:2ms"
     assert json.loads(out)["controllers"][0]["rmse_position_m"] == mine.rmse_position

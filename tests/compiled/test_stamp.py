@@ -160,6 +160,9 @@ json.dump(found, sys.stdout)
 """
 
 
+MOST_REACHED = 0.12  # of the files of the package
+
+
 def test_all_that_python_loads_for_a_kernel_is_in_its_stamp():
     names = sorted({kernel.py_func.__module__ for kernel in kernels().values()})
     done = subprocess.run(
@@ -169,10 +172,11 @@ def test_all_that_python_loads_for_a_kernel_is_in_its_stamp():
         check=True,
         env=os.environ | {"PYTHONPATH": str(PACKAGE.parent)},
     )
+    package = len(list(PACKAGE.rglob("*.py")))
     for name, files in json.loads(done.stdout).items():
         reach = stamp.reach(str(PACKAGE.parent.joinpath(*name.split(".")).with_suffix(".py")))
         assert set(files) <= reach, name
-        assert len(reach) < 80, f"{name} depends on a third of the package"
+        assert len(reach) < MOST_REACHED * package, f"{name} depends on {len(reach)} of {package} files"
 
 
 # ---- what an edit recompiles ------------------------------------------------------------------------------

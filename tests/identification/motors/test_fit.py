@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.motors import choice
+from omnidyn.identification.motors import choose_motor as choice
 from omnidyn.identification.motors.choice import fit_rmse, run_motor
 from omnidyn.identification.motors.choose_motor import WAYS, choose_motor
 from omnidyn.identification.motors.fit import fit_motor, fit_ways

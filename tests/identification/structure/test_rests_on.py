@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.structure.diagnosis import scaled
+from omnidyn.identification.output_error.linear.workbench import scaled
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate

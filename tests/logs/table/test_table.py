@@ -10,6 +10,7 @@ from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.readers.reader import ReadOptions
 from omnidyn.logs.readers.text import text_tables
+from tests.support.codes import said
 from tests.support.growth import ratio
 
 
@@ -274,7 +275,7 @@ def test_the_encoding_is_told_and_said(write, encoding, note):
 def test_zero_bytes_at_the_end_are_left_out_and_said(write, zeros):
     table = read_table(write(b"t_s,u1_V\n0,1\n0.1,2\n" + bytes(zeros)))
     np.testing.assert_array_equal(table.columns["u1_V"], [1.0, 2.0])
-    assert "zero bytes at the end, as a recorder leaves that lost its power, were left out" in table.notes
+    assert "zero bytes at the end, as a recorder leaves that lost its power, were left out" in said(table.notes)
 
 
 def test_broken_utf_16_is_refused(write):

@@ -11,7 +11,7 @@ from omnidyn.identification.output_error.linear.random_effects import RandomEffe
 from omnidyn.identification.output_error.linear.rounded_inputs import effects
 from omnidyn.identification.output_error.linear.rows import FitRows, Linear, noise_models
 from omnidyn.identification.output_error.memory.autoregression import _without_empty_axes
-from omnidyn.identification.output_error.problem import problem as module
+from omnidyn.identification.output_error.problem import bounded as module
 from omnidyn.identification.output_error.problem.bounded import ROWS, bounded
 from omnidyn.identification.structure.misfit import Gram
 
