@@ -64,7 +64,7 @@ def test_the_line_says_what_is_done_and_what_comes_next_and_the_address_keeps_th
 
 
 def test_a_process_that_ends_is_said_and_run_again(browser, tmp_path):
-    path = written(tmp_path / "long.csv", 60.0)
+    path = written(tmp_path / "long.csv", 300.0)
     studio, page = browser.start(path)
     verdict(page)
     choose_axebot(page)
