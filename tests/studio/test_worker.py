@@ -71,7 +71,7 @@ def test_what_is_cut_short_by_the_end_of_a_process_is_no_message():
 def test_a_check_and_a_fit_that_were_ended_are_said_and_run_again(tmp_path):
     async def scenario():
         session = Session()
-        fitting, log = Fitting(session), session.add_log(str(write_log(tmp_path / "log.csv", 20.0)), "log.csv")
+        fitting, log = Fitting(session), session.add_log(str(write_log(tmp_path / "log.csv", 150.0)), "log.csv")
         session.robot = "axebot"
         await finished(lambda: session.workers["log"]._process is not None)
         kill(session.workers["log"])
@@ -82,13 +82,13 @@ def test_a_check_and_a_fit_that_were_ended_are_said_and_run_again(tmp_path):
         await session.check(log)
         assert fitting.why_not() == ("", "")
         fit = asyncio.create_task(fitting.run())
-        await finished(lambda: fitting.last.running and fitting.last.progress.startswith(("reading", "fitting")))
+        await finished(lambda: session.workers["fit"].busy and session.workers["fit"]._process is not None)
         kill(session.workers["fit"])
         await fit
         assert fitting.last.stopped
         assert "run it again" in fitting.last.error
         fit = asyncio.create_task(fitting.run())
-        await finished(lambda: fitting.last.running and fitting.last.progress.startswith(("reading", "fitting")))
+        await finished(lambda: session.workers["fit"].busy and session.workers["fit"]._process is not None)
         await fitting.last.cancel(session, "fit", "fit")
         await fit
         assert fitting.last.stopped or fitting.last.result["interrupted"]
