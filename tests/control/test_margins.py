@@ -7,7 +7,7 @@ import omnidyn
 from omnidyn.control.circumstances import Circumstances
 from omnidyn.control.controller import Safe
 from omnidyn.control.controllers import controller_named
-from omnidyn.control.margins import MOST_DELAY, MOST_GAIN, SETTLED, SLOWER, Margins, loop_margins
+from omnidyn.control.margins import FARTHEST_DELAY, FARTHEST_GAIN, SETTLED, SLOWER, Margins, loop_margins
 from omnidyn.control.paths.motion import Path
 from omnidyn.model.drive import Drive
 
@@ -58,12 +58,12 @@ def test_the_delay_is_that_of_a_closed_form(gain, low, high):
 def test_a_loop_that_is_later_by_its_margin_has_none(name):
     control = controller_named(name, AXEBOT)
     first = loop_margins(AXEBOT, control, Circumstances()).delay
-    assert 0.015 <= first < MOST_DELAY
+    assert 0.015 <= first < FARTHEST_DELAY
     later = AXEBOT.replace(drive=Drive.model_validate({"kind": "voltage", "latency_s": first + 0.002}))
     assert loop_margins(later, control, Circumstances()) == Margins(0.0, 1.0)
 
 
 def test_what_measures_nothing_may_be_as_late_as_it_likes():
     tracking = omnidyn.track(AXEBOT, "eight", "feedforward", duration=1.0)
-    assert (tracking.margins.delay, tracking.margins.gain) == (MOST_DELAY, MOST_GAIN)
+    assert (tracking.margins.delay, tracking.margins.gain) == (FARTHEST_DELAY, FARTHEST_GAIN)
     assert "> 60" in tracking.summary()

@@ -19,7 +19,7 @@ from omnidyn.errors import InputError
 from omnidyn.files import check_output
 
 if TYPE_CHECKING:
-    from omnidyn.identification.planning.plan import Plan
+    from omnidyn.identification.planning.planned import Plan
 
 
 def plan(

@@ -25,7 +25,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds
 from omnidyn.simulation.live import LiveRobot
 
-MOST_DELAY, MOST_GAIN = 0.06, 4.0  # [s]; times
+FARTHEST_DELAY, FARTHEST_GAIN = 0.06, 4.0  # [s]; times
 HALVINGS = 5
 SECONDS, LEAST_STEPS = 2.0, 100
 END = 0.25  # of it
@@ -38,7 +38,7 @@ SHARES = np.array([0.25, 0.15, 0.2])  # of the top speeds: that of the path
 class Margins:
     """Of one loop. delay [s]: outputs may act so much later than they do; gain: be so many times as strong.
 
-    MOST_DELAY and MOST_GAIN: that much at least.
+    FARTHEST_DELAY and FARTHEST_GAIN: that much at least.
     """
 
     delay: float
@@ -77,8 +77,8 @@ def loop_margins(plant: Robot, controller: Controller, around: Circumstances) ->
     try:
         if not settles(0.0, 1.0):
             return Margins(0.0, 1.0)
-        delay = _largest(lambda share: settles(share * MOST_DELAY, 1.0)) * MOST_DELAY
-        gain = MOST_GAIN ** _largest(lambda share: settles(0.0, MOST_GAIN**share))
+        delay = _largest(lambda share: settles(share * FARTHEST_DELAY, 1.0)) * FARTHEST_DELAY
+        gain = FARTHEST_GAIN ** _largest(lambda share: settles(0.0, FARTHEST_GAIN**share))
     finally:
         controller.reset()
     return Margins(delay, gain)

@@ -11,7 +11,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import PATH_ENDED
-from omnidyn.control.margins import MOST_DELAY, MOST_GAIN, Margins
+from omnidyn.control.margins import FARTHEST_DELAY, FARTHEST_GAIN, Margins
 from omnidyn.document import Document, Part, Points, Table, plain
 from omnidyn.run import Run
 from omnidyn.shown import FIGURE, Displayable, make
@@ -243,8 +243,8 @@ def _margins(tracking: Tracking) -> tuple[str, str]:
         return "", ""
     delay, gain = tracking.margins.delay, tracking.margins.gain
     return (
-        f"{'> ' * (delay >= MOST_DELAY)}{1e3 * delay:.0f}",
-        f"{'> ' * (gain >= MOST_GAIN)}{gain:.2g}",
+        f"{'> ' * (delay >= FARTHEST_DELAY)}{1e3 * delay:.0f}",
+        f"{'> ' * (gain >= FARTHEST_GAIN)}{gain:.2g}",
     )
 
 

@@ -18,7 +18,7 @@ from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.friction_curve import FrictionCurve, sliding_force
 from omnidyn.identification.identification import Identification
 from omnidyn.identification.motors.study import MotorStudy
-from omnidyn.identification.planning.plan import Plan
+from omnidyn.identification.planning.planned import Plan
 from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.logs.path import path_of
 from omnidyn.model.frames import AXES

@@ -49,6 +49,15 @@ def _inside(statement: Statement) -> str:
     )
 
 
+def _records(statement: Statement) -> str:
+    """What a plan expects in the log, and how noisy."""
+    words = []
+    for channel, std in statement.numbers["noise"].items():
+        sizes = ", ".join(f"{size:.2g}" for size in dict.fromkeys(std.tolist()))
+        words.append(f"{channel} in counts of {sizes} rad" if channel == "wheel_angle" else f"{channel} +- {sizes}")
+    return f"predicted for a log of {all_of(words)}, at {statement.numbers['rate']:.4g} Hz; log less, and it tells less"
+
+
 def _predicted(held_out: Statement | None) -> str:
     """How near noise the errors on logs held out are; "" where none was, or nothing is sure."""
     if held_out is None or held_out.code == "held_out_colour":
@@ -139,6 +148,7 @@ def _of_groups(statement: Statement) -> str:
 SENTENCES = {
     "planned": Sentence(_planned),
     "plan_stays_inside": Sentence(_inside),
+    "plan_records": Sentence(_records),
     "plan_begins": Sentence(
         "drive both programs from rest, log them apart, and give the second, of {held_out:.3g} s, to identify as "
         "`hold_out`"

@@ -9,6 +9,7 @@ import omnidyn
 from omnidyn.identification.methods import OutputError
 from omnidyn.model.deadzone import axis_patterns
 from omnidyn.model.keys import BOX, Key
+from omnidyn.model.log_effects import Sensors
 from tests.support.pages import command
 
 AXEBOT, MECANUM = omnidyn.load_robot("axebot"), omnidyn.load_robot("mecanum")
@@ -170,3 +171,24 @@ def test_options_that_say_nothing_are_refused(words, said):
     _, code, err = command("plan", "axebot", *words)
     assert code == 3
     assert said in err
+
+
+def test_an_ordinary_robot_is_as_sure_as_it_was_told():
+    """Four wheels, duty with latency, counts, a camera of 30 Hz; a log by small steps, by the defaults of identify."""
+    four = omnidyn.load_robot("four-wheel")
+    sensors = Sensors(encoder_counts=2048, pose_rate=30.0, pose_noise=0.001, heading_noise=0.002)
+    robot = four.replace(drive=four.drive.replace(kind="duty", supply=12.0, latency=0.02), sensors=sensors)
+    made, rng, fine = omnidyn.plan(robot, ROOM, 40.0), np.random.default_rng(0), 20
+    assert "wheel_angle in counts of 0.0031 rad" in str(made)
+    run = omnidyn.simulate(robot, duty=np.repeat(made.commands().duty, fine, axis=0), supply=12.0, dt=made.dt / fine)
+    turned = np.cumsum(0.5 * (run.wheel_speed[1:] + run.wheel_speed[:-1]), axis=0) * made.dt / fine
+    tick, rows = 2.0 * np.pi / 2048, slice(None, None, fine)
+    angle = np.floor(np.concatenate([np.zeros((1, 4)), turned])[rows] / tick) * tick
+    pose = run.pose[rows] + rng.normal(size=angle[:, :3].shape) * (0.001, 0.001, 0.002)
+    pose[np.arange(len(pose)) % 3 > 0] = np.nan
+    log = omnidyn.Run(t=run.t[rows], duty=run.duty[rows], supply=run.supply[rows], wheel_angle=angle, pose=pose)
+    fit = omnidyn.identify(log, robot)
+    ratios = [fit.estimate.half_width(name) / number.half for name, number in made.predicted.items()]
+    print(f"got over planned: {np.round(ratios, 2)}")
+    assert 0.4 < np.exp(np.mean(np.log(ratios))) < 2.5
+    assert max(ratios) < 5.0

@@ -15,7 +15,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.engine import Weighting
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.output_error.solve.solver import Normal, Solution
+from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver
 from omnidyn.identification.output_error.trust.cures import Blind, blind_directions
 from omnidyn.identification.output_error.trust.uncertainty import WHITE, relative_changes, trust
 from omnidyn.model.robot import Robot
@@ -58,7 +58,7 @@ def information_of(runs: Sequence[Run], robot: Robot, question: OutputError) -> 
     Of runs that begin at rest, which is known: then it adds up.
     """
     fit = Fit.of(runs, robot, question)
-    solution = _at_robot(fit)
+    solution = _at_robot(fit, counts_ticks=False)
     problem, state = solution.solver.problem, solution.state
     relative, count = relative_changes(solution.solver, solution), len(problem.parameters)
     places = {id(record): k for k, record in enumerate(fit.groups[0].records)}
@@ -70,8 +70,11 @@ def information_of(runs: Sequence[Run], robot: Robot, question: OutputError) -> 
     return problem.names, information * np.outer(relative, relative)
 
 
-def _at_robot(fit: Fit) -> Solution:
-    """The robot as it was given, as if it were the best point."""
-    solver = fit.solver()
+def _at_robot(fit: Fit, counts_ticks: bool = True) -> Solution:
+    """The robot as it was given, as if it were the best point. counts_ticks: whether counts are taken as such."""
+    counting = fit.solver()
+    solver = Solver(counting.problem, counting.engine, counts_ticks=False)
     state = solver.state(solver.problem.start())
+    if counts_ticks and counting.scaled.any():
+        solver, state = counting, counting.state(state.point, counting.beside_rounding(state.variance))
     return Solution(state, Normal(solver, state).held, 0, True, solver)

@@ -11,33 +11,30 @@ import numpy as np
 
 from omnidyn.arguments import check_order, is_number
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Points, Table, plain
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.trust.cures import Blind
 from omnidyn.identification.planning.information import Prediction, information_of, told_by
 from omnidyn.identification.planning.moves import FORWARD, RAMP, SIDEWAYS, STEP, TURN, PlannedMove, all_moves
-from omnidyn.identification.planning.recorded import Noise, noise_of, recorded
+from omnidyn.identification.planning.planned import Plan, Predicted
+from omnidyn.identification.planning.recorded import Noise, driven, noise_of, recorded
 from omnidyn.identification.planning.search import (
     UNKNOWN,
     Score,
     TriedMove,
     chosen,
-    driven,
     geometric_mean,
     of_number,
     tried,
 )
-from omnidyn.model.keys import expand, friction_keys, in_words
+from omnidyn.model.drive import DUTY, SPEED
+from omnidyn.model.keys import expand, friction_keys
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run
-from omnidyn.shown import FIGURE, Displayable, make
 from omnidyn.simulation.batch.sample import sample
-from omnidyn.statement import NOTE, WARNING, Statement, as_verdict
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 DRAWS, GUESS = 10, (0.7, 1.3)  # robots that may be meant; share of a number of which nothing is known
 ROOM_SHARE = 0.8  # of the way to the border: what a plan uses of it
@@ -45,141 +42,12 @@ HELD_OUT_SHARE = 0.15  # of the time: a second program, to judge the fit by
 SEARCHES, KEPT = 8, 0.6  # plans that are compared whole; share of the moves that each of them may choose from
 SMALLER = 0.8  # of the reach of a move, where a whole plan left the room
 ATTEMPTS = 4  # at a plan that stays inside
-OPEN_SHARE = 0.5  # half an interval, of the number: what is wider is not learnt
 SMALLEST_ROOM, LARGEST_ROOM = 0.1, 1000.0  # [m]
 SHORTEST, LONGEST = 20.0, 3600.0  # [s]
 SLOWEST, FASTEST = 5.0, 1000.0  # [Hz]
-TELLS_NOTHING = 3.0  # half an interval, of the number, from which on no digit is shown
-DUTY = "duty"
 DOUBTED = ("gain", "dead_band")  # what a fit may need beside the numbers of the file: moves must tell that apart too
 SEED = 0  # of the robots and of the noise
 REST = 1.0  # [s] before the first move
-
-
-@dataclass(frozen=True)
-class Predicted:
-    """value: of a number now. half, worst: of its 95 % interval, as a share of the value: in the middle of the robots
-    drawn, and in the worst of them."""
-
-    value: float
-    half: float
-    worst: float
-
-    @property
-    def is_learnt(self) -> bool:
-        """Whether the plan tells it."""
-        return self.half < OPEN_SHARE
-
-
-@dataclass(frozen=True, eq=False)
-class Plan(Displayable):
-    """A program of moves, and what it will tell.
-
-    robot: it is made for. dt [s]: of a row. share (rows, wheels), held_out (rows, wheels): the input of the program and
-    of a second one to judge the fit by, as shares of the largest input; `limit` is that input, in `unit`, V or duty.
-    moves: (start [s], move) of the program. area [m], reach [m]: the room, and how far it goes along x and y at most,
-    of all robots drawn. predicted: key -> what will be known. noise: channel -> std, of what is recorded. blind: what
-    no log of these channels shows, and what would.
-    """
-
-    robot: Robot
-    dt: float
-    share: FloatArray
-    held_out: FloatArray
-    unit: str
-    limit: FloatArray
-    moves: tuple[tuple[float, PlannedMove], ...]
-    area: tuple[float, float]
-    reach: tuple[float, float]
-    predicted: Mapping[str, Predicted]
-    noise: Mapping[str, FloatArray]
-    blind: tuple[Blind, ...] = ()
-
-    @property
-    def seconds(self) -> float:
-        """Of both programs [s]."""
-        return (len(self.share) + len(self.held_out)) * self.dt
-
-    def commands(self, held_out: bool = False) -> Run:
-        """The program, or the one to judge by: time and input of each row, as `read_commands` takes them."""
-        share = self.held_out if held_out else self.share
-        t, values = np.asarray(self.dt * np.arange(len(share)), dtype=float), share * self.limit
-        if self.unit == DUTY:
-            return Run(t=t, duty=values, source="planned")
-        return Run(t=t, voltage=values, source="planned")
-
-    def drive(self) -> Run:
-        """What the robot of the file does under the program."""
-        return driven(self.robot, self.share, self.dt)
-
-    @property
-    def learnt(self) -> tuple[str, ...]:
-        """The numbers that it tells."""
-        return tuple(name for name, number in self.predicted.items() if number.is_learnt)
-
-    @property
-    def verdict(self) -> Statement:
-        """How well its numbers will be known."""
-        learnt = {name: self.predicted[name].half for name in self.learnt}
-        widest = max(learnt, key=lambda name: learnt[name], default="")
-        missing = tuple(name for name in self.predicted if name not in learnt)
-        numbers = {
-            "count": len(self.predicted),
-            "missing": missing,
-            "widest": widest,
-            "share": learnt.get(widest),
-            "seconds": self.seconds,
-        }
-        return Statement("planned", WARNING if missing else NOTE, self.robot.name, numbers)
-
-    def statements(self) -> list[Statement]:
-        """Where it goes, and what is asked of who drives it."""
-        return [
-            Statement("plan_stays_inside", NOTE, numbers={"reach": self.reach, "area": self.area, "robots": DRAWS}),
-            Statement("plan_begins", NOTE, numbers={"held_out": len(self.held_out) * self.dt}),
-            *(one.statement() for one in self.blind),
-        ]
-
-    def document(self) -> Document:
-        """What it says."""
-        numbers = [
-            (in_words(name), name, f"{number.value:.4g}", _percent(number.half), _percent(number.worst))
-            for name, number in self.predicted.items()
-        ]
-        moves = [
-            (f"{start:.1f}", move.direction, move.shape, f"{100.0 * move.level:.0f}", f"{move.seconds:g}")
-            for start, move in self.moves
-        ]
-        parts = [
-            Points(self.statements()),
-            Table(("number", "key", "now", "95 % +- %", "worst %"), numbers, "<<>>>", name="numbers"),
-            Table(("starts s", "direction", "input", "of the largest %", "lasts s"), moves, "><<>>", name="moves"),
-        ]
-        return Document(parts, as_verdict(self.verdict) | self.to_dict(), verdict=self.verdict)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON, but for the rows of the programs."""
-        return plain(
-            {
-                "robot": self.robot.name,
-                "seconds": self.seconds,
-                "row_s": self.dt,
-                "unit": self.unit,
-                "area_m": self.area,
-                "reach_m": self.reach,
-                "noise": {channel: std.tolist() for channel, std in self.noise.items()},
-                "predicted": {name: vars(number) for name, number in self.predicted.items()},
-                "moves": [{"start_s": start, **vars(move)} for start, move in self.moves],
-            }
-        )
-
-    def plot(self) -> Figure:
-        """The inputs, and where the robot goes in its room, as a matplotlib Figure."""
-        return make(FIGURE, self)
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g}" if share < TELLS_NOTHING else "-"
 
 
 def plan(
@@ -206,8 +74,9 @@ def plan(
         seconds: Of all of it, with the part that is held out [s].
         free: What is to be learnt, by keys of the robot file; default: as `identify`.
         aim: One of these numbers, to learn it best; default: the geometric mean of all standard errors.
-        noise: Channel (wheel_speed, current, twist, pose) -> std of what is recorded, one number or one per component;
-            default: by the [sensors] of the robot file, wheel speeds by an encoder.
+        noise: Channel (wheel_angle, wheel_speed, current, twist, pose) -> std of what is recorded, one number or one
+            per component; of wheel_angle the step of a count [rad]. Default: by the [sensors] of the robot file, counts
+            and poses; where it says nothing of counts, wheel speeds that are differences of 2048 a turn.
         rate: Of commands and of the log [Hz].
         progress: Hears what is done.
 
@@ -223,7 +92,7 @@ def plan(
     width, depth = _room(area)
     _check("seconds", seconds, SHORTEST, LONGEST, "s")
     _check("rate", rate, SLOWEST, FASTEST, "Hz")
-    if robot.drive.kind == "speed":
+    if robot.drive.kind == SPEED:
         raise UnsupportedError(
             "a firmware holds the speeds of the wheels: no plan is made for its set points",
             got=robot.name,
@@ -359,11 +228,12 @@ class _Planner:
             reach,
             predicted,
             self.noise,
+            len(self.robots),
             values.blind,
         )
 
     def _recorded(self, robot: Robot, share: FloatArray, rng: np.random.Generator) -> Any:
-        return recorded(driven(robot, share, self.dt), robot, self.noise, rng)
+        return recorded(robot, share, self.dt, self.noise, rng)
 
 
 def _of(predictions: Prediction, aim: str) -> float:

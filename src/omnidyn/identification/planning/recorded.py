@@ -8,26 +8,37 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
+from omnidyn.model.drive import DUTY
 from omnidyn.model.log_effects import Sensors
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
 
 Noise = Mapping[str, FloatArray]
-CHANNELS = {"wheel_speed": 0, "current": 0, "twist": 3, "pose": 3}  # entries of each; 0: one per wheel
+CHANNELS = {
+    "wheel_angle": 0,
+    "wheel_speed": 0,
+    "current": 0,
+    "twist": 3,
+    "pose": 3,
+}  # entries of each; 0: one per wheel
+INPUTS = ("voltage", "duty", "supply")
+FINE = 4  # steps in a row, over which the angle of a wheel adds up
 COUNTS = 2048.0  # in a turn of a wheel, where the robot file says nothing
 
 
 def noise_of(robot: Robot, dt: float, given: Mapping[str, object] | None = None) -> dict[str, FloatArray]:
-    """Channel -> std of its noise, one per component. given: by the user; else by the [sensors] of the robot file.
+    """Channel -> std of its noise, one per component; of wheel_angle the step of a count [rad].
 
-    Differences of counts of an encoder are speeds with the noise of what the count rounds off.
+    given: by the user; else by the [sensors] of the robot file: counts and poses. Where that says nothing of counts,
+    speeds are taken as logged that are differences of COUNTS a turn: with the noise of what a count rounds off.
 
     Raises InputError for another channel, or for a noise that is no positive number, or as many as components.
     """
     wheels, sensors = robot.wheels.count, robot.sensors or Sensors()
     if given is None:
-        speed = 2.0 * np.pi / (sensors.encoder_counts or COUNTS) / dt / np.sqrt(6.0)
-        given = {"wheel_speed": speed}
+        tick = 2.0 * np.pi / (sensors.encoder_counts or COUNTS)
+        given = {"wheel_angle": tick} if sensors.encoder_counts else {"wheel_speed": tick / dt / np.sqrt(6.0)}
         if sensors.pose_noise is not None:
             heading = sensors.heading_noise or sensors.pose_noise
             given |= {"pose": (sensors.pose_noise, sensors.pose_noise, heading)}
@@ -49,14 +60,29 @@ def noise_of(robot: Robot, dt: float, given: Mapping[str, object] | None = None)
     return stds
 
 
-def recorded(run: Run, robot: Robot, noise: Noise, rng: np.random.Generator) -> Run:
-    """The run as it is logged: its inputs, and each channel that has a noise; poses only as often as they come."""
+def driven(robot: Robot, share: FloatArray, dt: float) -> Run:
+    """A run from rest under an input given as a share of the largest one, rows of dt [s], shape (rows, wheels)."""
+    if robot.drive.kind == DUTY:
+        return simulate(robot, duty=share, supply=robot.drive.supply, dt=dt)
+    return simulate(robot, share * np.asarray(robot.motor.voltage_limit), dt)
+
+
+def recorded(robot: Robot, share: FloatArray, dt: float, noise: Noise, rng: np.random.Generator) -> Run:
+    """The log of such a run: its inputs, and each channel that has a noise; poses only as often as they come."""
+    fine = FINE if "wheel_angle" in noise else 1
+    run = driven(robot, np.repeat(share, fine, axis=0), dt / fine)
+    t = np.asarray(dt * np.arange(len(share) + 1), dtype=float)
     channels = {}
     for channel, std in noise.items():
-        values = np.asarray(getattr(run, channel)) + std * rng.standard_normal((len(run.t), len(std)))
+        if channel == "wheel_angle":
+            speed = np.asarray(run.wheel_speed)
+            angle = np.concatenate([np.zeros((1, len(std))), np.cumsum(0.5 * (speed[1:] + speed[:-1]), axis=0)])
+            channels[channel] = std * np.floor(angle[::fine] * dt / fine / std + rng.random(len(std)))
+            continue
+        exact = np.asarray(getattr(run, channel))[::fine]
+        channels[channel] = exact + std * rng.standard_normal(exact.shape)
         rate = (robot.sensors or Sensors()).pose_rate
         if channel == "pose" and rate is not None:
-            new = np.diff(np.floor(run.t * rate), prepend=-1.0) > 0.0
-            values[~new] = np.nan
-        channels[channel] = values
-    return Run(t=run.t, voltage=run.voltage, duty=run.duty, supply=run.supply, source="planned", **channels)
+            channels[channel][np.diff(np.floor(t * rate), prepend=-1.0) == 0.0] = np.nan
+    inputs = {name: None if rows is None else rows[::fine] for name in INPUTS for rows in (getattr(run, name),)}
+    return Run(t=t, source="planned", **inputs, **channels)

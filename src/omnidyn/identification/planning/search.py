@@ -10,9 +10,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.planning.moves import PlannedMove
+from omnidyn.identification.planning.recorded import driven
 from omnidyn.model.robot import Robot
-from omnidyn.run import Run
-from omnidyn.simulation.simulate import simulate
 
 LONGEST_REST, SPARE_REST = 2.0, 0.1  # [s] a robot that still moves then is asked for less; more than the slowest needs
 STANDS = np.array([2e-3, 2e-3, 1e-2])  # [m/s, m/s, rad/s] what is slower stands
@@ -26,13 +25,6 @@ class TriedMove(NamedTuple):
     move: PlannedMove
     reach: float
     moved: bool
-
-
-def driven(robot: Robot, share: FloatArray, dt: float) -> Run:
-    """A run from rest under an input given as a share of the largest one, rows of dt [s], shape (rows, wheels)."""
-    if robot.drive.kind == "duty":
-        return simulate(robot, duty=share, supply=robot.drive.supply, dt=dt)
-    return simulate(robot, share * np.asarray(robot.motor.voltage_limit), dt)
 
 
 def tried(move: PlannedMove, robots: Sequence[Robot], dt: float) -> TriedMove | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.identification.planning.plan import Plan
+from omnidyn.identification.planning.planned import Plan
 from omnidyn.report.figures.tracking import COLOURS, LINES
 from omnidyn.report.style import GREY, INK, WIDTH, Picture, look, new_figure, picture, thin_out
 

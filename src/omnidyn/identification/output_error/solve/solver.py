@@ -167,10 +167,12 @@ class Solver(Generic[P]):
         precision = max(self.close, NEAR_PRECISION) if self._scatter else self.close
         plain_solver = Solver(self.problem, self.engine, precision=precision, counts_ticks=False)
         plain_solution = plain_solver.minimise(start, limit, blocked_parameters=blocked_parameters)
-        start_state = self.state(
-            plain_solution.state.point, np.maximum(plain_solution.state.variance - self.tick**2 / 12.0, self.floor)
-        )
+        start_state = self.state(plain_solution.state.point, self.beside_rounding(plain_solution.state.variance))
         return self._descend(self._rescaled(start_state)[0], limit, progress, blocked_parameters)
+
+    def beside_rounding(self, variance: FloatArray) -> FloatArray:
+        """What of the variance of each column is not that of a count, which rounds evenly."""
+        return np.maximum(variance - self.tick**2 / 12.0, self.floor)
 
     def _descend(
         self, state: State, limit: int, progress: Progress | None, blocked_parameters: BoolArray | None

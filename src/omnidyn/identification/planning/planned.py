@@ -1,0 +1,158 @@
+"""What a plan is: a program of moves, and how well each number of the robot will be known after it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.document import Document, Points, Table, plain
+from omnidyn.identification.output_error.trust.cures import Blind
+from omnidyn.identification.planning.moves import PlannedMove
+from omnidyn.identification.planning.recorded import driven
+from omnidyn.model.drive import DUTY
+from omnidyn.model.keys import in_words
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+from omnidyn.shown import FIGURE, Displayable, make
+from omnidyn.statement import NOTE, WARNING, Statement, as_verdict
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+OPEN_SHARE = 0.5  # half an interval, of the number: what is wider is not learnt
+TELLS_NOTHING = 3.0  # half an interval, of the number, from which on no digit is shown
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """value: of a number now. half, worst: of its 95 % interval, as a share of the value: in the middle of the robots
+    drawn, and in the worst of them."""
+
+    value: float
+    half: float
+    worst: float
+
+    @property
+    def is_learnt(self) -> bool:
+        """Whether the plan tells it."""
+        return self.half < OPEN_SHARE
+
+
+@dataclass(frozen=True, eq=False)
+class Plan(Displayable):
+    """A program of moves, and what it will tell.
+
+    robot: it is made for. dt [s]: of a row. share (rows, wheels), held_out (rows, wheels): the input of the program and
+    of a second one to judge the fit by, as shares of the largest input; `limit` is that input, in `unit`, V or duty.
+    moves: (start [s], move) of the program. area [m], reach [m]: the room, and how far it goes along x and y at most,
+    of all robots drawn. predicted: key -> what will be known. noise: channel -> std, of what is recorded,
+    of wheel_angle the step of a count [rad]. robots: how many were drawn. blind: what
+    no log of these channels shows, and what would.
+    """
+
+    robot: Robot
+    dt: float
+    share: FloatArray
+    held_out: FloatArray
+    unit: str
+    limit: FloatArray
+    moves: tuple[tuple[float, PlannedMove], ...]
+    area: tuple[float, float]
+    reach: tuple[float, float]
+    predicted: Mapping[str, Predicted]
+    noise: Mapping[str, FloatArray]
+    robots: int
+    blind: tuple[Blind, ...] = ()
+
+    @property
+    def seconds(self) -> float:
+        """Of both programs [s]."""
+        return (len(self.share) + len(self.held_out)) * self.dt
+
+    def commands(self, held_out: bool = False) -> Run:
+        """The program, or the one to judge by: time and input of each row, as `read_commands` takes them."""
+        share = self.held_out if held_out else self.share
+        t, values = np.asarray(self.dt * np.arange(len(share)), dtype=float), share * self.limit
+        if self.unit == DUTY:
+            return Run(t=t, duty=values, source="planned")
+        return Run(t=t, voltage=values, source="planned")
+
+    def drive(self) -> Run:
+        """What the robot of the file does under the program."""
+        return driven(self.robot, self.share, self.dt)
+
+    @property
+    def learnt(self) -> tuple[str, ...]:
+        """The numbers that it tells."""
+        return tuple(name for name, number in self.predicted.items() if number.is_learnt)
+
+    @property
+    def verdict(self) -> Statement:
+        """How well its numbers will be known."""
+        learnt = {name: self.predicted[name].half for name in self.learnt}
+        widest = max(learnt, key=lambda name: learnt[name], default="")
+        missing = tuple(name for name in self.predicted if name not in learnt)
+        numbers = {
+            "count": len(self.predicted),
+            "missing": missing,
+            "widest": widest,
+            "share": learnt.get(widest),
+            "seconds": self.seconds,
+        }
+        return Statement("planned", WARNING if missing else NOTE, self.robot.name, numbers)
+
+    def statements(self) -> list[Statement]:
+        """Where it goes, and what is asked of who drives it."""
+        return [
+            Statement(
+                "plan_stays_inside", NOTE, numbers={"reach": self.reach, "area": self.area, "robots": self.robots}
+            ),
+            Statement("plan_records", NOTE, numbers={"noise": self.noise, "rate": 1.0 / self.dt}),
+            Statement("plan_begins", NOTE, numbers={"held_out": len(self.held_out) * self.dt}),
+            *(one.statement() for one in self.blind),
+        ]
+
+    def document(self) -> Document:
+        """What it says."""
+        numbers = [
+            (in_words(name), name, f"{number.value:.4g}", _percent(number.half), _percent(number.worst))
+            for name, number in self.predicted.items()
+        ]
+        moves = [
+            (f"{start:.1f}", move.direction, move.shape, f"{100.0 * move.level:.0f}", f"{move.seconds:g}")
+            for start, move in self.moves
+        ]
+        parts = [
+            Points(self.statements()),
+            Table(("number", "key", "now", "95 % +- %", "worst %"), numbers, "<<>>>", name="numbers"),
+            Table(("starts s", "direction", "input", "of the largest %", "lasts s"), moves, "><<>>", name="moves"),
+        ]
+        return Document(parts, as_verdict(self.verdict) | self.to_dict(), verdict=self.verdict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON, but for the rows of the programs."""
+        return plain(
+            {
+                "robot": self.robot.name,
+                "seconds": self.seconds,
+                "row_s": self.dt,
+                "unit": self.unit,
+                "area_m": self.area,
+                "reach_m": self.reach,
+                "noise": {channel: std.tolist() for channel, std in self.noise.items()},
+                "predicted": {name: vars(number) for name, number in self.predicted.items()},
+                "moves": [{"start_s": start, **vars(move)} for start, move in self.moves],
+            }
+        )
+
+    def plot(self) -> Figure:
+        """The inputs, and where the robot goes in its room, as a matplotlib Figure."""
+        return make(FIGURE, self)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g}" if share < TELLS_NOTHING else "-"
