@@ -120,8 +120,8 @@ def test_duties_are_planned_as_duties():
     [
         ({"area": (3.0,)}, "not the size of a room"),
         ({"area": (3.0, -1.0)}, "not the size of a room"),
-        ({"seconds": 1.0}, "strange seconds"),
-        ({"rate": 1e6}, "strange rate"),
+        ({"seconds": 1.0}, "seconds: out of range"),
+        ({"rate": 1e6}, "rate: out of range"),
         ({"noise": {"sonar": 0.1}}, "no such channel"),
         ({"noise": {"twist": (0.1, 0.2)}}, "no noise of twist"),
         ({"noise": {"twist": 0.0}}, "no noise of twist"),
@@ -165,7 +165,13 @@ def test_the_command_writes_two_programs_that_simulate_reads(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"), [(("--area", "big"), "such as 3x3"), (("--noise", "twist"), "such as twist=0.02")]
+    ("words", "said"),
+    [
+        (("--area", "big"), "such as 3x3"),
+        (("--noise", "twist"), "such as twist=0.02"),
+        (("--time", "3"), "--time: out of range; got 3.0; expected 20"),
+        (("--time", "20", "--for", "body.mass_kg"), "--for: not a number that is free"),
+    ],
 )
 def test_options_that_say_nothing_are_refused(words, said):
     _, code, err = command("plan", "axebot", *words)

@@ -7,6 +7,7 @@ from functools import cache
 
 # Options beside those of `omnidyn identify`, and those whose flag is not their name.
 PLAIN_OPTIONS = (
+    "area",
     "assume",
     "azimuth",
     "column",
@@ -59,6 +60,7 @@ def flags() -> dict[str, str]:
     words = {name: spec.metadata["flag"] or name for name, spec in options().items()}
     words["groups"] = "per"
     words["beside"] = "with"
+    words["aim"], words["seconds"] = "for", "time"  # of a plan
     words["variables"] = "var"  # of a file of MATLAB
     return {
         name: f"--{word.replace('_', '-')}"

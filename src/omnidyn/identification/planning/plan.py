@@ -178,8 +178,9 @@ class _Planner:
     def _score(self, names: tuple[str, ...], aim: str) -> Score:
         if not aim:
             return geometric_mean
-        if aim not in names:
-            raise InputError("not a number that is free", got=aim, expected=", ".join(names), where="aim")
+        free = [name for name in names if name not in DOUBTED]
+        if aim not in free:
+            raise InputError("not a number that is free", got=aim, expected=", ".join(free), where="aim")
         return of_number(names.index(aim))
 
     def _programs(self, opening: Sequence[PlannedMove], moves: Sequence[PlannedMove], seconds: float) -> _Programs:
@@ -280,4 +281,4 @@ def _room(area: object) -> tuple[float, float]:
 
 def _check(name: str, value: object, least: float, most: float, unit: str) -> None:
     if not is_number(value) or not least <= value <= most:  # type: ignore[operator]
-        raise InputError(f"strange {name}", got=value, expected=f"{least:g} to {most:g} {unit}", where=name)
+        raise InputError("out of range", got=value, expected=f"{least:g} to {most:g} {unit}", where=name)
