@@ -288,7 +288,7 @@ def like(
         source=f"omnidyn init: like {preset.name}, to be identified",
         wheels=wheels,
         motor=motor,
-        body=Body(mass=mass, inertia=inertia, rotating_frame=True),
+        body=Body(mass=mass, inertia=inertia, rotating_frame=preset.body.rotating_frame),
         drive=preset.drive,
         friction=friction,
         priors={},

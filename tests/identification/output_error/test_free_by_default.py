@@ -152,7 +152,7 @@ def test_what_is_asked_for_is_doubted_by_the_check_too(robot, tmp_path):
     exact, share = robot.replace(priors={}), 0.3
     magnet = {name: share * getattr(robot.motor, name) for name in ("torque_constant", "emf_constant")}
     run, _ = log_of(robot.replace(motor=robot.motor.replace(**magnet)), share)
-    log = read_log(write_run(run, tmp_path / "log.csv"))
+    log = read_log(write_run(run, tmp_path / "log.csv"), recorded=True)
     assert "energy" in codes(identify(log, exact, OutputError(start="rest", nuisances=()), quick=True))
     free = ("friction", "motor.torque_constant_Nm_A", RESISTANCE)
     mended = identify(log, exact, OutputError(start="rest", nuisances=(), free=free), quick=True)
