@@ -188,7 +188,7 @@ def test_a_robot_that_holds_more_than_it_slides_by_is_said_to_slide_on_a_slope()
     robot = omnidyn.load_robot("axebot")
     axes = robot.friction.axes
     sticky = robot.replace(friction=robot.friction.replace(axes=axes.replace(breakaway=(4.4, 3.0, 0.2))))
-    (words,) = [words for words in mjcf(sticky).omissions if "breakaway" in words]
+    (words,) = [words for words in mjcf(sticky).missing if "breakaway" in words]
     assert "slides on a slope that the robot holds" in words
     assert "coulomb raised to breakaway" in words
     held = robot.replace(friction=robot.friction.replace(axes=axes.replace(coulomb=(4.4, 3.0, 0.2))))
