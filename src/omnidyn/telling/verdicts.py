@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from omnidyn.document import all_of, short
 from omnidyn.model.keys import in_words
+from omnidyn.sensors import COUNTED
 from omnidyn.statement import Statement
 from omnidyn.telling.lack_of_fit import names_of
 from omnidyn.telling.sentence import Sentence
@@ -54,7 +55,7 @@ def _records(statement: Statement) -> str:
     words = []
     for channel, std in statement.numbers["noise"].items():
         sizes = ", ".join(f"{size:.2g}" for size in dict.fromkeys(std.tolist()))
-        words.append(f"{channel} in counts of {sizes} rad" if channel == "wheel_angle" else f"{channel} +- {sizes}")
+        words.append(f"{channel} in counts of {sizes} rad" if channel in COUNTED else f"{channel} +- {sizes}")
     return f"predicted for a log of {all_of(words)}, at {statement.numbers['rate']:.4g} Hz; log less, and it tells less"
 
 

@@ -22,13 +22,13 @@ from omnidyn.identification.output_error.engines.engine import FitEngine
 from omnidyn.identification.output_error.engines.exact import HEADING, POSITION, PUSH, TILT
 from omnidyn.identification.output_error.engines.valley import bent
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
-from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
 from omnidyn.model.known.breakaway_levels import holding
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
+from omnidyn.sensors import TRAVEL
 from omnidyn.simulation.sensitivity.directions import EPS, difference
 from omnidyn.simulation.sensitivity.late_sample import (
     Direction,
@@ -57,7 +57,7 @@ def path_tolerance(problem: Problem) -> float:
     finest, rows = np.inf, 0
     for record in {id(piece.record): piece.record for piece in problem.pieces}.values():
         for c, (name, _) in enumerate(record.columns):
-            if name in TRAVELS:
+            if name in TRAVEL:
                 rows += int(np.isfinite(record.outputs[:, c]).sum())
                 finest = min(finest, _reach(name, problem.robot) * _noise(record, c))
     tol = PATH_SHARE * finest / (PATH_ERROR * np.sqrt(max(rows, 1) * max(longest, 1.0)))
@@ -116,7 +116,7 @@ class ImplicitEngine(FitEngine[Problem]):
         """The engine of wheels that roll, or of wheels that may slip. tol [m/s]: where a path is fitted, as much finer
         as its sensors ask for."""
         kind = ImplicitEngine if problem.robot.wheels.traction_mu is None else SlipEngine
-        if tol is None or not any(name in TRAVELS for name, _ in problem.columns):
+        if tol is None or not any(name in TRAVEL for name, _ in problem.columns):
             return kind(problem, tol)
         return kind(problem, min(tol * path_tolerance(problem) / SPEED_TOLERANCE, max(tol, PATH_TOLERANCES[1])))
 
