@@ -1,7 +1,6 @@
 """Names of what a log can hold: the channels of a Run, taken apart into one component per column.
 
-voltage u1 u2 ..   duty d1 ..   current i1 ..   wheel_angle a1 ..   wheel_speed w1 ..   wheel_speed_command w1_cmd ..
-twist vx vy omega   twist_command vx_cmd vy_cmd omega_cmd   pose x y heading   supply   force f1
+Such as u1 u2 of a voltage, vx vy omega of a twist: the table stands in sensors.py.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import MIN_WHEELS, wheel_speed
 from omnidyn.progress import Progress, silent
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
-from omnidyn.sensors import BEHIND_GEAR
+from omnidyn.sensors import BEHIND_GEAR, COUNTED, TABLE
 from omnidyn.statement import NOTE, Statement, statements
 
 STANDSTILL_SPEED = 1e-6  # [rad/s] a commanded speed below counts as none
@@ -255,9 +255,9 @@ def log_from_table(
         if location is None:
             continue
         values = table.measured(column.name, missing=True, skip=options.skip_bad_rows)
-        if location[0] == "wheel_angle":
+        if location[0] in COUNTED:
             values = counters.angle(key, column, values)
-        if location[0] == "wheel_speed":
+        if TABLE[location[0]].integral in COUNTED:
             values = counters.speed(key, column, values)
         values = values * column.factor
         if location[0] in BEHIND_GEAR:

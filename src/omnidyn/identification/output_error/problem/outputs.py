@@ -132,7 +132,8 @@ def _counted(
     run: Run, values_by_output: dict[str, FloatArray], count_differences: Differences | None, notes: list[Statement]
 ) -> tuple[dict[str, FloatArray], FloatArray | None, BoolArray | None]:
     """(the outputs, speeds that are differences of counts as angles; ticks of these, rows before which one is lost)."""
-    if count_differences is None or "wheel_speed" not in values_by_output or "wheel_angle" in values_by_output:
+    rate = next((name for name in values_by_output if TABLE[MEASURED[name][0]].integral), "")
+    if count_differences is None or not rate or TABLE[rate].integral in values_by_output:
         return values_by_output, None, None
     tick = {"tick": float(np.median(count_differences.ticks))}
     if count_differences.reason is not None:
@@ -141,7 +142,7 @@ def _counted(
     angle, lost = added_up(run, count_differences)
     notes.append(Statement("counts_added_up", NOTE, run.source or LOG, tick))
     return (
-        {name: value for name, value in values_by_output.items() if name != "wheel_speed"} | {"wheel_angle": angle},
+        {name: value for name, value in values_by_output.items() if name != rate} | {TABLE[rate].integral: angle},
         count_differences.ticks,
         lost,
     )
