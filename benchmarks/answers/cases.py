@@ -317,8 +317,8 @@ save_robot(load_robot("prior.toml"), "saved.toml")
 save_robot(load_robot("prior.toml"), "box.toml")
 load_robot("axbot")
 [state_space(load_robot(name)) for name in preset_names()]
-[[row.pattern for row in dead_zone(load_robot(name), draws=2).rows] for name in preset_names()]
-[[row.scale for row in dead_zone(load_robot(name), draws=2).rows] for name in preset_names()]
+[[row.pattern for row in dead_zone(load_robot(name)).rows] for name in preset_names()]
+[[row.scale for row in dead_zone(load_robot(name)).rows] for name in preset_names()]
 [dead_zone(load_robot(f"{name}.toml"), [[1, -2, 0.5], [0, 0, 0]]).rows for name in ("mixed", "ellipse", "limits")]
 dead_zone(load_robot("axebot"), [1, 2])
 [dead_zone(load_robot(f"{name}.toml"), directions=np.arange(0, 6.3, 0.7)).voltage for name in ("box", "disc", "ellipse", "wheels")]

@@ -19,11 +19,11 @@ def _numbers_known(statement: Statement) -> str:
     count, missing, widest = numbers["count"], numbers["missing"], numbers["widest"]
     if len(missing) == count:
         return f"no number is known{f': not {names_of(missing)}' if missing else ''}"
-    known = f"{count - len(missing)} of" if missing else "all"
+    share = f"{count - len(missing)} of" if missing else "all"
     within = f"within {short(max(0.1, 100.0 * numbers['share']))} %"
     if count == 1:
         return f"{in_words(widest)} is known {within}"
-    words = f"{known} {count} numbers are known, the widest ({in_words(widest)}) {within}"
+    words = f"{share} {count} numbers are known, the widest ({in_words(widest)}) {within}"
     return f"{words}; not known: {names_of(missing)}" if missing else words
 
 
@@ -142,8 +142,8 @@ def _shapes(statement: Statement) -> str:
 
 def _of_groups(statement: Statement) -> str:
     """How well the numbers of each group are known."""
-    groups, known = statement.numbers["groups"], statement.numbers["known"]
-    return "; ".join(f"{g}: {k}" if len(known) > 1 else str(k) for g, k in zip(groups, known, strict=True))
+    groups, sentences = statement.numbers["groups"], statement.numbers["known"]
+    return "; ".join(f"{g}: {k}" if len(sentences) > 1 else str(k) for g, k in zip(groups, sentences, strict=True))
 
 
 SENTENCES = {

@@ -268,8 +268,8 @@ def spread_of_motion(values: FloatArray) -> float:
 
 def _driven(work: LogUnderCheck, k: int) -> bool:
     """Whether what gives an unsigned current its sign ever drives motor k."""
-    way, _ = driven_way(work.log, work.geometry)
-    return way is None or k >= way.shape[1] or bool((np.abs(way[:, k]) > 0.0).any())
+    distance, _ = driven_way(work.log, work.geometry)
+    return distance is None or k >= distance.shape[1] or bool((np.abs(distance[:, k]) > 0.0).any())
 
 
 def _wheel_moves(work: LogUnderCheck, k: int) -> bool:

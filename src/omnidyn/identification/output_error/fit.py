@@ -66,7 +66,6 @@ from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
 from omnidyn.progress import silent
 from omnidyn.run import Run, as_list
-from omnidyn.sensors import TRAVEL
 from omnidyn.statement import WARNING, Statement
 
 
@@ -336,7 +335,7 @@ class Fit:
         if not self._chooses:
             return solution
         chosen_solution = better_of(solution, self._plain(solution, progress))
-        adds_up = all(name in TRAVEL for name, _ in chosen_solution.solver.problem.columns)  # then no force is taken
+        adds_up = chosen_solution.solver.problem.travels.all()  # then no force is taken
         if adds_up or trust(chosen_solution.solver, chosen_solution, AUTO).kind != SANDWICH:
             return chosen_solution
         inner_progress = progress.aside("once more with a constant force")

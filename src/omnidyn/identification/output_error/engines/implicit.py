@@ -109,7 +109,7 @@ class ImplicitEngine(FitEngine[Problem]):
         """The engine of wheels that roll, or of wheels that may slip. tol [m/s]: where a path is fitted, as much finer
         as its sensors ask for."""
         kind = ImplicitEngine if problem.robot.wheels.traction_mu is None else SlipEngine
-        if tol is None or not any(name in TRAVEL for name, _ in problem.columns):
+        if tol is None or not problem.travels.any():
             return kind(problem, tol)
         return kind(problem, min(tol * path_tolerance(problem) / SPEED_TOLERANCE, max(tol, PATH_TOLERANCES[1])))
 

@@ -21,7 +21,6 @@ from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.problem import Column, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
-from omnidyn.sensors import TRAVEL
 
 TAIL = 6  # blocks of the log, to which a fit is made that the rest of it is predicted by
 TINY = 1e-300
@@ -118,7 +117,7 @@ def free_run(
         if b >= TAIL:
             tail_residual = residual[block] - slopes[block] @ tail_step
             tail[b - TAIL] = np.bincount(column[block], tail_residual**2, len(white)) * variance
-    travels = np.array([name in TRAVEL for name, _ in problem.columns])
+    travels = problem.travels
     count = np.where(travels & ~travels.all(), 0.0, rows.added(lambda k, j: rows.masks[k][j]))
     return FreeRun(square, count, _spread(rows), bool(travels.all()), tail)
 

@@ -26,12 +26,12 @@ Shown = tuple[FloatArray, FloatArray, FloatArray]  # value (rows, m), its time d
 
 
 class ExactRow(NamedTuple):
-    """Where an output is written as linear: speed (3, ...) of the twist, way (5, ...) of the integrals of the twist and
-    the displacement, volts (1, ...) of the voltage of its wheel; zeros before. is_slope: whether derivatives by the
+    """Where an output is written as linear: speed (3, ...) of the twist, path (5, ...) of its integrals and of the
+    displacement, volts (1, ...) of the voltage of its wheel; zeros before. is_slope: whether derivatives by the
     parameters are written, the last axis."""
 
     speed: FloatArray
-    way: FloatArray
+    path: FloatArray
     volts: FloatArray
     is_slope: bool
 

@@ -26,7 +26,7 @@ class Heading(Observation):
     def exact(self, row: ExactRow, values: Primitives, i: int, start_heading: float) -> None:
         """y = the integral of omega"""
         if not row.is_slope:
-            row.way[YAW] = 1.0
+            row.path[YAW] = 1.0
 
     def sampled(self, sample: LateSample, start_heading: float) -> Shown:
         """What the run has turned by."""
@@ -45,7 +45,7 @@ class Position(Observation):
     def exact(self, row: ExactRow, values: Primitives, i: int, start_heading: float) -> None:
         """y = (R(heading at the start) p)_i of the displacement p"""
         if not row.is_slope:
-            row.way[N_AXES:] = body_to_world(start_heading)[i, :YAW]
+            row.path[N_AXES:] = body_to_world(start_heading)[i, :YAW]
 
     def sampled(self, sample: LateSample, start_heading: float) -> Shown:
         """The place of the run."""

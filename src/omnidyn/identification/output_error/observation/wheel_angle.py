@@ -27,7 +27,7 @@ class WheelAngle(Observation):
 
     def exact(self, row: ExactRow, values: Primitives, i: int, start_heading: float) -> None:
         """y = (G^T s)_i / r of the way s along the axes of the body"""
-        row.way[:N_AXES] = values.wheels[i]
+        row.path[:N_AXES] = values.wheels[i]
 
     def sampled(self, sample: LateSample, start_heading: float) -> Shown:
         """Of the way, or of the wheels themselves where they slip."""

@@ -214,7 +214,7 @@ def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
     costs = side_by_side(lambda point: solver.state(point).objective, points)
     best = _levels_first(short, points[int(np.argmin(costs))], nu, progress)
     start_points = [best]
-    if any(name in TRAVEL for name, _ in short.columns):
+    if short.travels.any():
         start_points.append(_by_rates(short, best, nu, progress))
     parts = {p.part for p in problem.parameters}
     if LATENCY in parts and (MOTOR in parts or problem.where(CURRENTS) >= 0):

@@ -28,7 +28,6 @@ from omnidyn.identification.output_error.solve.normal_equations import (
 )
 from omnidyn.identification.output_error.solve.steps import Order
 from omnidyn.progress import Progress, Report
-from omnidyn.sensors import TRAVEL
 from omnidyn.statement import Statement
 
 MAX_ITERATIONS = 60
@@ -112,7 +111,7 @@ class Solver(Generic[P]):
     ):
         self.problem, self.engine, self.nu, self.close, self.counted = problem, engine, nu, precision, counts_ticks
         is_exact = precision <= END_PRECISION  # or a speed loop, which may creep for long, and yet find its way
-        adds_up = any(name in TRAVEL for name, _ in problem.columns)  # what speeds are off by scatters F
+        adds_up = problem.travels.any()  # what speeds are off by scatters F
         self._scatter = 0.0 if is_exact or not adds_up else SCATTER
         self.creep = 0.0 if is_exact else max(CREEP * precision, 2.0 * self._scatter)
         self._kink = max(KINK_PRECISION, precision, 2.0 * self._scatter)  # F would change by less than it scatters
