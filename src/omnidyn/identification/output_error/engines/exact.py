@@ -34,9 +34,9 @@ from omnidyn.identification.output_error.kernel.march_sums import (
     march,
 )
 from omnidyn.identification.output_error.kernel.pull import Room
-from omnidyn.identification.output_error.observation.observation import ExactRow
-from omnidyn.identification.output_error.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.heading import facing_at_start, headings, in_the_body
+from omnidyn.identification.output_error.problem.observation.observation import ExactRow
+from omnidyn.identification.output_error.problem.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.primitives import PrimitiveMap, Primitives
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import at_motors

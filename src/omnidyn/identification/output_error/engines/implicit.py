@@ -21,9 +21,9 @@ from omnidyn.identification.output_error.engines.driver import LATENCY_PREFIX, d
 from omnidyn.identification.output_error.engines.engine import FitEngine
 from omnidyn.identification.output_error.engines.exact import HEADING, POSITION, PUSH, TILT
 from omnidyn.identification.output_error.engines.valley import bent
-from omnidyn.identification.output_error.observation.observation import Shown
-from omnidyn.identification.output_error.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
+from omnidyn.identification.output_error.problem.observation.observation import Shown
+from omnidyn.identification.output_error.problem.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage

@@ -12,7 +12,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.driver import LATENCY_PREFIX
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, through_the_end, travel_of
-from omnidyn.identification.output_error.observation.observation import Shown
+from omnidyn.identification.output_error.problem.observation.observation import Shown
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot

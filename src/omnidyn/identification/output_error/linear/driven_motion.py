@@ -14,9 +14,9 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.driver import driver_of
-from omnidyn.identification.output_error.observation.observation import Along
-from omnidyn.identification.output_error.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.heading import HEADING, facing_at_start
+from omnidyn.identification.output_error.problem.observation.observation import Along
+from omnidyn.identification.output_error.problem.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors, without_map
 from omnidyn.model.drive import SPEED

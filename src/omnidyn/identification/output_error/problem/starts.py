@@ -17,7 +17,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.clocks import time_of_row
 from omnidyn.compiled.kernel import kernel, maker
-from omnidyn.identification.output_error.observation.observations import OBSERVATIONS
+from omnidyn.identification.output_error.problem.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.primitives import PrimitiveMap
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot

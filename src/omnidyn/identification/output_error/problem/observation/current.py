@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.output_error.observation.observation import Along, ExactRow, Observation, Shown
+from omnidyn.identification.output_error.problem.observation.observation import Along, ExactRow, Observation, Shown
 from omnidyn.model.dynamics import settled_currents
 
 if TYPE_CHECKING:

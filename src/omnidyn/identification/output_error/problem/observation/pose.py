@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.output_error.observation.columns import rates_of
-from omnidyn.identification.output_error.observation.observation import Along, ExactRow, Observation, Shown
+from omnidyn.identification.output_error.problem.observation.columns import rates_of
+from omnidyn.identification.output_error.problem.observation.observation import Along, ExactRow, Observation, Shown
 from omnidyn.model.frames import body_to_world, world_to_body
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.robot import Robot

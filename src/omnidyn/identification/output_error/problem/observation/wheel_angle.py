@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.output_error.observation.columns import columns_of, rates_of
-from omnidyn.identification.output_error.observation.observation import Along, ExactRow, Observation, Shown
+from omnidyn.identification.output_error.problem.observation.columns import columns_of, rates_of
+from omnidyn.identification.output_error.problem.observation.observation import Along, ExactRow, Observation, Shown
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed

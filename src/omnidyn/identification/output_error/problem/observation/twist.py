@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.output_error.observation.columns import columns_of, together
-from omnidyn.identification.output_error.observation.observation import Along, ExactRow, Observation, Shown
+from omnidyn.identification.output_error.problem.observation.columns import columns_of, together
+from omnidyn.identification.output_error.problem.observation.observation import Along, ExactRow, Observation, Shown
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 
