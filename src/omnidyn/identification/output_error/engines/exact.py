@@ -381,7 +381,7 @@ def _at(used_indices: IntArray, values: FloatArray, total: int) -> FloatArray:
 
 
 def _wheel_of(columns: Sequence[Column]) -> IntArray:
-    return np.array([i if name == "current" else -1 for name, i in columns])
+    return np.array([i if OBSERVATIONS[name].has_volts else -1 for name, i in columns])
 
 
 def _blocks(piece: Piece, weighting: Weighting) -> int:

@@ -197,7 +197,7 @@ class ImplicitEngine(FitEngine[Problem]):
             np.multiply(channel_slopes[:, :, i], factors, out=slopes[c, :, :keys])
             if latency_indices[c] >= 0:
                 slopes[c, :, slope_indices.index(latency_indices[c])] = -pace[:, i]
-            if piece.at_rest and name != "current":  # before its first row it was at rest, too
+            if piece.at_rest and not OBSERVATIONS[name].has_volts:  # before its first row it was at rest, too
                 rows_before_start = t - t[0] < latencies[c]
                 residual[c][rows_before_start], slopes[c, rows_before_start] = (
                     measured[c][rows_before_start] - state[N_AXES + c],

@@ -9,6 +9,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.problem.observation.observation import Along, ExactRow, Observation, Shown
 from omnidyn.model.dynamics import settled_currents
+from omnidyn.model.motor import per_wheel
+from omnidyn.model.robot import Robot
 
 if TYPE_CHECKING:
     from omnidyn.identification.output_error.problem.primitives import Primitives
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 
 class Current(Observation):
     """Current of each motor [A]."""
+
+    has_volts = True
 
     def exact(self, row: ExactRow, values: Primitives, i: int, start_heading: float) -> None:
         """y = (braking v)_i + per_volt_i u_i"""
@@ -30,3 +34,7 @@ class Current(Observation):
         """Of wheels that roll; the voltage stays."""
         robot = along.robot
         return settled_currents(robot, change, np.zeros(robot.wheels.count)) * along.rolls[:, None, :]
+
+    def of_volts(self, robot: Robot, volts: FloatArray, i: int) -> FloatArray:
+        """u / R"""
+        return volts[..., i] / per_wheel(robot.motor.resistance, robot.wheels.count)[i]

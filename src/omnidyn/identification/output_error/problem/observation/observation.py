@@ -52,9 +52,10 @@ class Along(NamedTuple):
 
 
 class Observation:
-    """An output of m columns."""
+    """An output of m columns. has_volts: whether it changes at once with the voltage of its wheel."""
 
     travel = TURN
+    has_volts = False
 
     def exact(self, row: ExactRow, values: Primitives, i: int, start_heading: float) -> None:
         """Write column i. start_heading: the heading at the start of the piece [rad]."""
@@ -66,6 +67,10 @@ class Observation:
 
     def changed(self, along: Along, change: FloatArray) -> FloatArray:
         """Its change with that of the twist (n, K, 3). Shape (n, K, m)."""
+        raise NotImplementedError
+
+    def of_volts(self, robot: Robot, volts: FloatArray, i: int) -> FloatArray:
+        """What column i shows of voltages (..., W) at once, of an output that has some."""
         raise NotImplementedError
 
     def twist(self, record: Record, robot: Robot) -> FloatArray | None:
