@@ -3,6 +3,8 @@
 Those that take minutes even then (fits of many kinds of log, logs of gigabytes) are left to `dev.py bench`.
 """
 
+import ast
+import builtins
 import json
 import os
 import subprocess
@@ -11,8 +13,10 @@ from pathlib import Path
 
 import pytest
 
+import omnidyn
 from benchmarks.__main__ import NAMES
 from benchmarks.answers import differences
+from benchmarks.answers.cases import CALLS
 
 ROOT = Path(__file__).resolve().parents[1]
 QUICK = (
@@ -63,3 +67,11 @@ def test_each_quick_benchmark_runs_at_its_smallest_size(name):
 def test_a_changed_number_is_told_from_changed_words(old: object, new: object, kind: str) -> None:
     assert {each.kind for each in differences(old, new)} == {kind}
     assert not list(differences(old, old))
+
+
+def test_calls_of_answers_use_names_that_are_public():
+    public = {*omnidyn.__all__, *dir(builtins), "np", "Path"}
+    for text in CALLS:
+        names = [node for node in ast.walk(ast.parse(text, mode="eval")) if isinstance(node, ast.Name)]
+        local = {node.id for node in names if isinstance(node.ctx, ast.Store)}
+        assert {node.id for node in names} - local <= public, text

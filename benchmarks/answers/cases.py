@@ -317,12 +317,12 @@ save_robot(load_robot("prior.toml"), "saved.toml")
 save_robot(load_robot("prior.toml"), "box.toml")
 load_robot("axbot")
 [state_space(load_robot(name)) for name in preset_names()]
-[axis_patterns(load_robot(name)) for name in preset_names()]
-[breakaway_voltage(load_robot(name), axis_patterns(load_robot(name))) for name in preset_names()]
-[breakaway_voltage(load_robot(f"{name}.toml"), [[1, -2, 0.5], [0, 0, 0]]) for name in ("mixed", "ellipse", "limits")]
-breakaway_voltage(load_robot("axebot"), [1, 2])
-[dead_zone_map(load_robot(f"{name}.toml"), np.arange(0, 6.3, 0.7)) for name in ("box", "disc", "ellipse", "wheels")]
-[moving_axes(load_robot(f"{name}.toml"), np.outer(np.arange(5), [0, 0.3, -0.3])) for name in ("box", "sticky", "mixed")]
+[[row.pattern for row in dead_zone(load_robot(name)).rows] for name in preset_names()]
+[[row.scale for row in dead_zone(load_robot(name)).rows] for name in preset_names()]
+[dead_zone(load_robot(f"{name}.toml"), [[1, -2, 0.5], [0, 0, 0]]).rows for name in ("mixed", "ellipse", "limits")]
+dead_zone(load_robot("axebot"), [1, 2])
+[dead_zone(load_robot(f"{name}.toml"), directions=np.arange(0, 6.3, 0.7)).voltage for name in ("box", "disc", "ellipse", "wheels")]
+[dead_zone(load_robot(f"{name}.toml")).moving_axes(np.outer(np.arange(5), [0, 0.3, -0.3])) for name in ("box", "sticky", "mixed")]
 acceleration(load_robot("box.toml"), [[0.1, 0.2, -1], [0, 0, 0]], [[1, 2, 3], [0.1, 0, 0]])
 acceleration(load_robot("mixed.toml"), [[0.1, 0.2, -1], [0, 0, 0]], [[1, 2, 3], [0.1, 0, 0]])
 acceleration(load_robot("ellipse.toml"), [0.1, 0, 0], [4, 1])
@@ -354,12 +354,12 @@ read_log("bad/text.csv", skip_bad_rows=True)
 read_log("bad/unsigned.csv", current_unsigned=True)
 read_log("full.csv", assume={"u": "parsec"})
 read_log("full.csv", columns={"u1": "wind:V"})
-recorded_log("bad/nans.csv")
-recorded_log("examples/robotino/exp00.csv", load_robot("robotino"))
-recorded_log("log.zip")
-check(recorded_log("bad/swapped.csv"), load_robot("box.toml"))
-check(recorded_log("bad/slip.csv"), load_robot("box.toml"))
-check(recorded_log("full.csv"))
+read_log("bad/nans.csv", recorded=True)
+read_log("examples/robotino/exp00.csv", load_robot("robotino"), recorded=True)
+read_log("log.zip", recorded=True)
+check(read_log("bad/swapped.csv", recorded=True), load_robot("box.toml"))
+check(read_log("bad/slip.csv", recorded=True), load_robot("box.toml"))
+check(read_log("full.csv", recorded=True))
 read_commands("c.csv", 3)
 read_commands("ds.csv", 3, duration=1.2)
 read_commands("back.csv", 3)

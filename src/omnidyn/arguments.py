@@ -91,13 +91,13 @@ def check_order(call: str, *places: tuple[object, Kinds]) -> None:
     )
 
 
-def unknown_option(owner: str, option: str, known: Iterable[str], where: str) -> InputError:
+def unknown_option(owner: str, option: str, options: Iterable[str], where: str) -> InputError:
     """The error of an option that something does not have, with the nearest that it has."""
-    matches = difflib.get_close_matches(option, list(known), 1, 0.4)
+    matches = difflib.get_close_matches(option, list(options), 1, 0.4)
     return InputError(
         f"{owner} has no such option",
         got=option,
-        expected=", ".join(known),
+        expected=", ".join(options),
         remedy=f"did you mean {matches[0]}?" if matches else "",
         where=where,
     )

@@ -15,42 +15,12 @@ from omnidyn.arrays import FloatArray
 from omnidyn.clocks import fastest_step, has_own_clock, is_staggered, samples, usual_step
 from omnidyn.document import Document, Points, Table
 from omnidyn.errors import InputError
+from omnidyn.sensors import AXIS, CHANNELS, SCALAR, SENSORS, UNITS, WHEEL
 from omnidyn.shown import ANIMATION, DATASET, FIGURE, FRAME, RUN, Displayable, make
 from omnidyn.statement import Statement, statements
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-WHEEL, AXIS, SCALAR = "wheel", "axis", "scalar"
-
-# What the columns of a channel are: one per wheel, one per axis (x, y, yaw), or none.
-CHANNELS = {
-    "voltage": WHEEL,
-    "duty": WHEEL,
-    "current": WHEEL,
-    "wheel_angle": WHEEL,
-    "wheel_speed": WHEEL,
-    "wheel_speed_command": WHEEL,
-    "twist": AXIS,
-    "twist_command": AXIS,
-    "pose": AXIS,
-    "supply": SCALAR,
-    "force": WHEEL,
-}
-SENSORS = ("wheel_speed", "wheel_angle", "twist", "pose", "current")  # what was measured; all else are inputs
-UNITS = {
-    "voltage": "V",
-    "duty": "1",
-    "current": "A",
-    "wheel_angle": "rad",
-    "wheel_speed": "rad/s",
-    "wheel_speed_command": "rad/s",
-    "twist": "m/s, m/s, rad/s",
-    "twist_command": "m/s, m/s, rad/s",
-    "pose": "m, m, rad",
-    "supply": "V",
-    "force": "N",
-}
 
 
 @dataclass(frozen=True, eq=False)

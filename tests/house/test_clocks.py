@@ -29,7 +29,11 @@ ALLOWED = {
     "identification/output_error/linear/missing_inputs.py": (1, "not asked of clocks of their own"),
     "identification/output_error/problem/decimated.py": (3, "all rows, of which several are taken together"),
     "identification/structure/windows.py": (1, "the rows between which a command holds"),
-    "identification/output_error/linear/driven_motion.py": (4, "steps of the simulation, which stops at every row"),
+    "identification/output_error/problem/observation/observation.py": (
+        1,
+        "steps of the simulation, which stops at every row",
+    ),
+    "identification/output_error/linear/driven_motion.py": (2, "steps of the simulation, which stops at every row"),
 }
 
 

@@ -30,6 +30,7 @@ FLOORS = (
     "statement",
     "attempts",
     "compiled",
+    "sensors",
     "run",
     "model",
     "simulation",

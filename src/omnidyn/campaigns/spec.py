@@ -191,10 +191,12 @@ class IdentifyTask(Value):
         if not isinstance(tables, Mapping):
             return tables
         options = {**tables.get("options", {}), **{key: v for key, v in tables.items() if key not in cls.model_fields}}
-        known = {option.name for kind in FRICTION_METHODS for option in fields(kind)} - {"per_free"}
+        option_names = {option.name for kind in FRICTION_METHODS for option in fields(kind)} - {"per_free"}
         for name in options:
-            if name not in known:
-                raise unknown_option("a fit", name, sorted({*known, *cls.model_fields} - {"options"}), "[identify]")
+            if name not in option_names:
+                raise unknown_option(
+                    "a fit", name, sorted({*option_names, *cls.model_fields} - {"options"}), "[identify]"
+                )
         return {key: v for key, v in tables.items() if key in cls.model_fields} | {"options": options}
 
     def method_asked(self) -> Method | None:
@@ -203,9 +205,9 @@ class IdentifyTask(Value):
             return None
         named = [kind for kind in FRICTION_METHODS if self.method in (AUTO, kind.name)]
         for kind in named:
-            known = {option.name: option for option in fields(kind)}
-            if known.keys() >= self.options.keys():
-                return kind(**{name: _names(value, known[name]) for name, value in self.options.items()})
+            option_by_name = {option.name: option for option in fields(kind)}
+            if option_by_name.keys() >= self.options.keys():
+                return kind(**{name: _names(value, option_by_name[name]) for name, value in self.options.items()})
         raise InputError(
             f"{named[0].name if len(named) == 1 else 'no method'} has all these options",
             got=", ".join(self.options),

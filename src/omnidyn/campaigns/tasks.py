@@ -173,10 +173,10 @@ class LoadedSpec:
         return task.replace(map=self.name_of(task.map))
 
     def _check_metrics(self) -> None:
-        known = TRACK_METRICS if self.spec.track is not None else SIMULATE_METRICS
+        metric_names = TRACK_METRICS if self.spec.track is not None else SIMULATE_METRICS
         for name in self.spec.metrics if self.function is None else ():
-            if name not in known:
-                raise unknown_option("the task", name, known, "metrics")
+            if name not in metric_names:
+                raise unknown_option("the task", name, metric_names, "metrics")
 
     def _check_word(self, name: str, word: Any) -> None:
         if name == "path":

@@ -49,10 +49,10 @@ def _version(wanted: bool) -> None:
 
 def robots(json: bool = typer.Option(False, "--json", help="For machines.")) -> None:
     """List the robots that come along."""
-    known = {name: omnidyn.load_robot(name) for name in omnidyn.preset_names()}
-    data = [{"name": name, "wheels": robot.wheels.count, "source": robot.source} for name, robot in known.items()]
-    rows = [(name, f"{robot.wheels.count} wheels", robot.source) for name, robot in known.items()]
-    tell(Document([Table((), rows, "<")], {"robots": data}), json, provenance([robot_input(name) for name in known]))
+    presets = {name: omnidyn.load_robot(name) for name in omnidyn.preset_names()}
+    data = [{"name": name, "wheels": robot.wheels.count, "source": robot.source} for name, robot in presets.items()]
+    rows = [(name, f"{robot.wheels.count} wheels", robot.source) for name, robot in presets.items()]
+    tell(Document([Table((), rows, "<")], {"robots": data}), json, provenance([robot_input(name) for name in presets]))
 
 
 STUDIO_PORT = 8642

@@ -15,6 +15,7 @@ from omnidyn.cli.terminal.numbers import number_list, number_words
 from omnidyn.cli.terminal.sizes import LEAST_WHEELS, MOST_WHEELS, refuse_sizes
 from omnidyn.cli.terminal.streams import say
 from omnidyn.errors import InputError
+from omnidyn.logs.channels import components
 from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.logs.geometry import Geometry, as_mecanum, turned_wheels, wheel_geometry
 from omnidyn.logs.read_log import LogOptions
@@ -310,8 +311,8 @@ def from_logs(values: dict[str, Any], log: list[str], options: LogOptions, mecan
     say(f"omnidyn: wheels {verb} {number_words(tuple(azimuth))} degrees, {remark}")
     counted_back = turned_wheels(geometry) if mecanum else ()
     if counted_back:
-        letter = "a" if geometry.wheels == "wheel_angle" else "w"
-        options_of_all = " ".join(f"--column {letter}{k}=-NAME" for k in counted_back)
+        names = components(geometry.wheels, len(azimuth))
+        options_of_all = " ".join(f"--column {names[k - 1]}=-NAME" for k in counted_back)
         say(f"omnidyn: wheels {number_words(counted_back)} count clockwise: turned; say {options_of_all} elsewhere")
     if mecanum:
         geometry = as_mecanum(geometry)

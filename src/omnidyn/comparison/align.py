@@ -131,9 +131,9 @@ def _signals(run: Run) -> Signals:
     for channel, values in run.channels.items():
         columns = values.reshape(len(run), -1)
         for name, column in zip(components(channel, columns.shape[1]), columns.T, strict=True):
-            t, known = samples(run.t, column)
-            if len(t) > 2 and np.ptp(known) > 0.0:
-                signals[name] = t, known
+            t, values = samples(run.t, column)
+            if len(t) > 2 and np.ptp(values) > 0.0:
+                signals[name] = t, values
     for name in [*signals]:
         letters = name.rstrip("0123456789")
         if letters in RATES:

@@ -21,6 +21,7 @@ from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
+from omnidyn.sensors import PREDICTED, SHOWN
 from omnidyn.simulation.engine import TOLERANCE
 from omnidyn.statement import Statement
 
@@ -126,7 +127,7 @@ def what_is_compared(robots: Sequence[Robot], runs: Sequence[Run], apply: str | 
         raise InsufficientDataError(
             "the logs hold nothing that a model predicts",
             got=", ".join(runs[0].channels),
-            expected="twist, wheel_speed, wheel_angle, current or pose",
+            expected=f"{', '.join(PREDICTED[:-1])} or {PREDICTED[-1]}",
             remedy="map the columns of speeds, angles, currents or the pose",
         )
     return in_order(components, robots[0].wheels.count)
@@ -134,8 +135,7 @@ def what_is_compared(robots: Sequence[Robot], runs: Sequence[Run], apply: str | 
 
 def in_order(names: Mapping[str, None], wheels: int) -> tuple[str, ...]:
     """Components in the order they are shown in: speeds first."""
-    channels = ("twist", "wheel_speed", "wheel_angle", "current", "voltage", "pose")
-    return tuple(name for channel in channels for name in components(channel, wheels) if name in names)
+    return tuple(name for channel in SHOWN for name in components(channel, wheels) if name in names)
 
 
 def _named(robot: Robot, other: Robot | None) -> dict[str, Robot]:

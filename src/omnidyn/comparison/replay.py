@@ -24,18 +24,17 @@ from omnidyn.logs.segments import segments
 from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
-from omnidyn.run import CHANNELS, WHEEL, Run
+from omnidyn.run import Run
+from omnidyn.sensors import CHANNELS, OUTPUTS, SHOWN, STARTS, WHEEL
 from omnidyn.simulation.commands import Commands, commands
 from omnidyn.simulation.engine import TOLERANCE
 from omnidyn.simulation.simulate import simulate_seen
-from omnidyn.simulation.view import LATE_CHANNELS, View, seen_at_once, seen_through
+from omnidyn.simulation.view import View, seen_at_once, seen_through
 from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import stretches
 
 INPUTS = ("voltage", "duty", "wheel_speed_command", "twist_command")
 SET_SPEEDS = INPUTS[2:]
-STARTS = ("twist", "wheel_speed", "wheel_angle", "heading", "position")  # which channel tells where a run starts
-SIMULATED = ("voltage", "current", "wheel_speed", "wheel_angle", "twist", "pose")
 HOLD = 0.2  # [s] a missing input keeps its last value for so long
 FEWEST_ROWS = 3  # rows of a piece
 SHOWN_WARNINGS = 3  # warnings of one kind
@@ -277,14 +276,14 @@ def _view(
 ) -> View:
     """What a log shows of a piece, whose rows are `steps`. parts: steps of the simulation in a row.
 
-    The start was measured by the first channel of LATE_CHANNELS: the run begins by so much earlier as that is late.
+    The start was measured by the first of the channels in OUTPUTS: the run begins by so much earlier as that is late.
     of_angles: wheel speeds are wanted as late as the angles that they add up to.
     """
     moving = applied_commands.set_point is None  # a speed loop rests before its first command
     if log is None:
         return seen_at_once(robot, applied_commands, held=moving)
     t, drive, row = run.t, robot.drive.latency, run.step
-    late = {name: log.latency.of(name, drive, row) for name in LATE_CHANNELS}
+    late = {name: log.latency.of(name, drive, row) for name in OUTPUTS}
     if of_angles:
         late["wheel_speed"] = late["wheel_angle"]
     share = np.repeat((t[steps] - t[0]) / (t[-1] - t[0]), parts)
@@ -293,12 +292,10 @@ def _view(
 
 def _first(run: Run) -> str:
     """The channel that tells where a free run of this log starts."""
-    channels = {name for name in LATE_CHANNELS if getattr(run, name, None) is not None}
+    channels = {name for name in OUTPUTS if getattr(run, name, None) is not None}
     if run.pose is not None:
         channels |= {"heading"} if np.isfinite(run.pose[:, 2]).any() else {"position"}
-    return next(
-        (name for name in ("twist", "wheel_speed", "wheel_angle", "heading", "position") if name in channels), "twist"
-    )
+    return next((name for name in STARTS if name in channels), STARTS[0])
 
 
 def _turned(fine: Run, parts: int) -> FloatArray:
@@ -315,7 +312,7 @@ def _turned(fine: Run, parts: int) -> FloatArray:
 def _assembled(run: Run, robot: Robot, pieces: list[slice], parts: list[Run]) -> Run:
     """One Run at the times of the log, NaN between the pieces."""
     channels: dict[str, Any] = {}
-    for name in SIMULATED:
+    for name in SHOWN:
         if getattr(parts[0], name) is None:
             continue
         width = robot.wheels.count if CHANNELS[name] == WHEEL else 3

@@ -10,9 +10,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.comparison.replay import SET_SPEEDS
 from omnidyn.logs.channels import components, place, si_suffix
 from omnidyn.run import Run
+from omnidyn.sensors import FROM_START, PREDICTED
 
-COMPARED = ("twist", "wheel_speed", "wheel_angle", "current", "pose")
-SINCE_START = ("wheel_angle", "pose")  # channels that count from where a piece begins
 TURN = 2.0 * np.pi
 
 
@@ -34,7 +33,7 @@ def compared_components(run: Run, applied: str) -> tuple[str, ...]:
 
     The voltage counts where the speed loop of the model had to make it.
     """
-    channels = (*COMPARED, "voltage") if applied in SET_SPEEDS else COMPARED
+    channels = (*PREDICTED, "voltage") if applied in SET_SPEEDS else PREDICTED
     present = []
     for channel in channels:
         values = getattr(run, channel)
@@ -80,7 +79,7 @@ def unwrapped(measured: FloatArray, model: FloatArray) -> FloatArray:
 def counts_from_start(component: str) -> bool:
     """Whether a component counts from where a piece begins: its level there was given to the model."""
     location = place(component)
-    return location is not None and location[0] in SINCE_START
+    return location is not None and location[0] in FROM_START
 
 
 def unit(component: str) -> str:

@@ -16,6 +16,7 @@ from typing import Protocol
 from omnidyn.comparison.traces import unit
 from omnidyn.document import all_of
 from omnidyn.logs.channels import place
+from omnidyn.sensors import TABLE
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 
 FOLLOWS, HALF, NOTHING = 0.2, 0.5, 1.0  # error over spread
@@ -31,12 +32,6 @@ PLAIN = {
     ("pose", 0): "position",
     ("pose", 1): "position",
     ("pose", 2): "heading",
-}
-OF_WHEELS = {
-    "wheel_speed": "wheel speeds",
-    "wheel_angle": "wheel angles",
-    "current": "currents",
-    "voltage": "voltages",
 }
 
 
@@ -112,7 +107,7 @@ def plain_name(component: str) -> str:
     location = place(component)
     if location is None:
         return component
-    return OF_WHEELS.get(location[0]) or PLAIN.get(location, component)
+    return TABLE[location[0]].words or PLAIN.get(location, component)
 
 
 def _share(score: Scored) -> float:

@@ -22,6 +22,7 @@ from omnidyn.logs.sensor_rows import on_clock_of_wheels
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+from omnidyn.sensors import OF_WHEELS, PREDICTED
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 
 WHOLE_LOGS, STEADY, MOTORS, GEOMETRY = "whole logs", "steady state", "motors", "geometry"
@@ -31,7 +32,6 @@ AT_REST = 0.02  # [rad/s] of a wheel: 1 mm/s at the rim of one of 5 cm
 SURE_ERRORS = 2.0  # standard errors: a mean speed below is not known to be one
 NEVER, FEW_ROWS = "never_moved", "few_rows"  # findings that leave nothing to do
 INPUTS, SET_SPEEDS = ("voltage", "duty"), ("wheel_speed_command", "twist_command")
-WHEELS = ("wheel_speed", "wheel_angle")
 
 
 def uses(log: Log, robot: Robot | None = None, codes: Collection[str] = ()) -> tuple[Use, ...]:
@@ -77,16 +77,16 @@ def _whole(run: Run, robot: Robot | None, columns: ColumnMap) -> Use:
     """A fit of the whole log by output error."""
     reason = needs.why_not_whole(run, robot)
     if reason is not None:
-        no_output = not any(getattr(run, name) is not None for name in needs.OUTPUTS)
+        no_output = not any(getattr(run, name) is not None for name in PREDICTED)
         no_input = run.voltage is None and run.duty is None
-        channels = (*(INPUTS if no_input else ()), *(needs.OUTPUTS if no_output else ()))
+        channels = (*(INPUTS if no_input else ()), *(PREDICTED if no_output else ()))
         return _not(WHOLE_LOGS, reason.code, columns, *channels)
     if use := _not_robot(WHOLE_LOGS, run, robot, columns) or _no_battery(WHOLE_LOGS, run, robot, columns):
         return use
     if use := _no_stretch(run, robot, columns):
         return use
     drives = next(name for name in (*INPUTS, *SET_SPEEDS) if getattr(run, name) is not None)
-    outputs = [name for name in needs.OUTPUTS if getattr(run, name) is not None]
+    outputs = [name for name in PREDICTED if getattr(run, name) is not None]
     return _yes(WHOLE_LOGS, "serves_whole", input=drives, outputs=outputs, needs=_needs_of_robot(run, robot, drives))
 
 
@@ -129,7 +129,7 @@ def _steady(run: Run, robot: Robot | None, columns: ColumnMap) -> Use:
     if not origin:
         return _not(STEADY, "no_force", columns, *INPUTS, "current")
     if not needs.turns_known(run):
-        return _not(STEADY, "no_wheel_motion", columns, *WHEELS)
+        return _not(STEADY, "no_wheel_motion", columns, *OF_WHEELS)
     battery = _no_battery(STEADY, run, robot, columns) if origin == needs.VOLTAGE else None
     if use := _not_robot(STEADY, run, robot, columns) or battery:
         return use
@@ -165,8 +165,10 @@ def _motors(run: Run, columns: ColumnMap) -> Use:
     if not kind:
         return _not(MOTORS, "no_motor_input", columns, *needs.MOTOR_INPUTS)
     if not needs.turns_known(run):
-        return _not(MOTORS, "no_motor_motion", columns, *WHEELS)
-    return _yes(MOTORS, "serves_motors", input=kind, speeds=[name for name in WHEELS if getattr(run, name) is not None])
+        return _not(MOTORS, "no_motor_motion", columns, *OF_WHEELS)
+    return _yes(
+        MOTORS, "serves_motors", input=kind, speeds=[name for name in OF_WHEELS if getattr(run, name) is not None]
+    )
 
 
 def _geometry(run: Run) -> Use:

@@ -14,10 +14,10 @@ from omnidyn.model.drive import SPEED
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+from omnidyn.sensors import OF_WHEELS, PREDICTED
 from omnidyn.simulation.exact.exact_march import why_not_exact
 from omnidyn.statement import Statement
 
-OUTPUTS = ("twist", "wheel_speed", "wheel_angle", "current", "pose")  # what a model predicts
 CURRENT, VOLTAGE = "current", "voltage"  # where the force of the motors is from
 MOTOR_INPUTS: tuple[str, ...] = ("voltage", "duty", "current", "force")
 LOOP_REMEDY = (
@@ -48,7 +48,7 @@ def why_not_whole(run: Run, robot: Robot | None) -> Statement | None:
             return Statement("set_speeds_only")
     elif no_drive:
         return Statement("no_input")
-    if not any(getattr(run, name) is not None for name in OUTPUTS):
+    if not any(getattr(run, name) is not None for name in PREDICTED):
         return Statement("no_output")
     return None
 
@@ -78,7 +78,7 @@ def motor_input(runs: Sequence[Run], kinds: Sequence[str] = MOTOR_INPUTS) -> str
 
 def turns_known(run: Run) -> bool:
     """Whether a speed or an angle of the wheels was logged."""
-    return run.wheel_speed is not None or run.wheel_angle is not None
+    return any(getattr(run, name) is not None for name in OF_WHEELS)
 
 
 def loses_in_gear(robot: Robot) -> bool:

@@ -15,11 +15,10 @@ from omnidyn.logs.column import MOTOR_SIDE, ROOM, Column
 from omnidyn.logs.columns.mapping import ColumnMap, component_channel, unit_and_side
 from omnidyn.logs.read_log import LogOptions
 from omnidyn.model.wheels import MAX_WHEELS
-from omnidyn.run import CHANNELS, WHEEL
+from omnidyn.sensors import OF_MOTORS
 from omnidyn.statement import ERROR, Statement
 from omnidyn.units import DUTY, known_unit
 
-MOTOR_CHANNELS = tuple(name for name, kind in CHANNELS.items() if kind == WHEEL and name != "force")
 POSE_OF_TWIST = {"vx": "x", "vy": "y", "omega": "heading"}
 
 Columns = dict[str, Column]
@@ -80,7 +79,7 @@ def _wired(finding: Finding, columns: Mapping[str, Column]) -> Columns | None:
     numbers, wiring = finding.numbers, finding.numbers["wiring"]
     changed = _placed(wiring, columns, lambda name: name)
     if numbers.get("blamed") == "motors":
-        for channel in MOTOR_CHANNELS:
+        for channel in OF_MOTORS:
             names = components(channel, MAX_WHEELS)
             if changed is not None and channel != "wheel_speed" and any(name in columns for name in names):
                 changed = _placed(wiring, changed, lambda name, names=names: names[int(name[1:]) - 1])

@@ -13,10 +13,11 @@ from omnidyn.findings.finding import Finding, Verdict, gone_by_fit, judged_again
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
+from omnidyn.sensors import OF_WHEELS
 from omnidyn.statement import ERROR, Statement
 
+DRIVES = ("voltage", "duty", "current", "force", "supply")
 CHECKED_ROWS = 1_000_000  # rows that are checked on the way
-OF_MOTORS = ("voltage", "duty", "current", "force", "supply", "wheel_speed", "wheel_angle")
 
 
 def log_verdicts(logs: Sequence[Log], robot: Robot | None, progress: Progress) -> tuple[Verdict, ...]:
@@ -77,7 +78,9 @@ def told_why(verdicts: Sequence[Verdict], use: str) -> Iterator[None]:
 def of_motors(log: Log, *extra_channels: str) -> Log:
     """The log with what concerns motors alone, and channels `extra_channels`: on a bench, neither body nor heading need
     move."""
-    kept_channels = {name: channel for name, channel in log.channels.items() if name in (*OF_MOTORS, *extra_channels)}
+    kept_channels = {
+        name: channel for name, channel in log.channels.items() if name in (*DRIVES, *OF_WHEELS, *extra_channels)
+    }
     return replace(log, channels=kept_channels)
 
 

@@ -25,6 +25,7 @@ from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.logs.channels import place
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
+from omnidyn.sensors import COUNTED
 from omnidyn.statement import NOTE, WARNING, Statement
 from omnidyn.statistics import difference_noise, find_tick, robust_std
 
@@ -222,10 +223,10 @@ def _tick(logged: Sequence[Run], name: str) -> float:
     logged: as recorded.
     """
     channel, column = place(name) or ("", 0)
-    if channel != "wheel_angle":
+    if channel not in COUNTED:
         return 0.0
-    angles = [run.wheel_angle for run in logged if run.wheel_angle is not None]
-    return max((find_tick(angle[:, column]) for angle in angles), default=0.0)
+    values = [counts[:, column] for run in logged if (counts := getattr(run, channel)) is not None]
+    return max(map(find_tick, values), default=0.0)
 
 
 def _chi2(

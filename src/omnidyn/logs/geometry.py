@@ -23,6 +23,7 @@ from omnidyn.logs.read_log import STANDSTILL_SPEED
 from omnidyn.logs.segments import GAP
 from omnidyn.model.frames import unwrapped
 from omnidyn.run import Run
+from omnidyn.sensors import OF_WHEELS
 
 MAX_CONDITION = 50.0  # of the directions driven: beyond it, one of them is only noise
 MAX_RESIDUAL = 0.2  # share of the wheel speeds that the fit may leave: beyond it these are not omni wheels
@@ -31,10 +32,7 @@ MAX_TURNED = 15.0  # [degree] that they may seem to stand elsewhere
 COMMANDS = ("twist_command", "wheel_speed_command")
 SOURCES = (
     COMMANDS,
-    ("twist", "wheel_speed"),
-    ("twist", "wheel_angle"),
-    ("pose", "wheel_speed"),
-    ("pose", "wheel_angle"),
+    *((body, wheels) for body in ("twist", "pose") for wheels in OF_WHEELS),
 )
 WINDOWS = (
     0.4,
@@ -97,8 +95,8 @@ def wheel_geometry(runs: Sequence[Run], instead: str = "`azimuth`") -> Geometry:
     raise first or InputError(
         "cannot tell where the wheels stand",
         got=", ".join(runs[0].channels) if runs else "no log",
-        expected="twist_command and wheel_speed_command, or twist or pose with wheel_speed or wheel_angle, all "
-        "components of them",
+        expected="twist_command and wheel_speed_command, or twist or pose with "
+        f"{' or '.join(OF_WHEELS)}, all components of them",
         remedy=f"say which columns they are (`column` w1=NAME), or leave the logs out and give {instead}",
     )
 
@@ -266,7 +264,7 @@ SPEEDS = ("twist", "wheel_speed")  # the others are positions
 def mean_speeds(run: Run, body: str, wheels: str, window: float = WINDOWS[0]) -> tuple[FloatArray, FloatArray]:
     """(twist of the body, speeds of the wheels), means over windows; shapes (windows, 3) and (windows, wheels).
 
-    body: "twist" or "pose". wheels: "wheel_speed" or "wheel_angle". Windows that a sensor was out in are left out; a
+    body: "twist" or "pose". wheels: one of OF_WHEELS. Windows that a sensor was out in are left out; a
     turn rate that was never logged counts as none.
     """
     tracks = [*_body_tracks(run, body), *_tracks(*run.samples(wheels), wheels in SPEEDS)]

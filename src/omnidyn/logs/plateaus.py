@@ -21,6 +21,7 @@ from omnidyn.errors import InputError
 from omnidyn.logs.segments import segments
 from omnidyn.model.frames import world_to_body
 from omnidyn.run import Run
+from omnidyn.sensors import FROM_START
 from omnidyn.statistics import HUBER_CLIP, autocorrelation_time, robust_mean, robust_std
 
 MIN_ROWS, MIN_DURATION = 12, 0.4  # [s]
@@ -137,7 +138,7 @@ def _plateau(run: Run, rows: slice, angle: FloatArray | None) -> Plateau:
     mean, std, t = {}, {}, run.t[rows]
     speeds = {name: (t, values[rows]) for name, values in run.channels.items() if name in ("wheel_speed", "twist")}
     for name, values in run.channels.items():
-        if name not in ("wheel_angle", "pose"):
+        if name not in FROM_START:
             mean[name], std[name] = robust_mean(values[rows])
     speed_from = SPEED if "wheel_speed" in mean else ""
     if angle is not None and len(sample_rows := _seen(angle[rows])) > 1:

@@ -24,7 +24,7 @@ from omnidyn.logs.column import Column
 from omnidyn.logs.columns.frame_of import turn_to_body, with_frames
 from omnidyn.logs.columns.guess import guess_columns, refuse_doubtful
 from omnidyn.logs.columns.guess_time import refuse_second_time
-from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, load_map, parse_column
+from omnidyn.logs.columns.mapping import ColumnMap, component_channel, load_map, parse_column
 from omnidyn.logs.joined_files import joined_table
 from omnidyn.logs.log import Log
 from omnidyn.logs.readers.read_table import iter_tables, read_table
@@ -36,6 +36,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import MIN_WHEELS, wheel_speed
 from omnidyn.progress import Progress, silent
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
+from omnidyn.sensors import BEHIND_GEAR, COUNTED, TABLE
 from omnidyn.statement import NOTE, Statement, statements
 
 STANDSTILL_SPEED = 1e-6  # [rad/s] a commanded speed below counts as none
@@ -254,12 +255,12 @@ def log_from_table(
         if location is None:
             continue
         values = table.measured(column.name, missing=True, skip=options.skip_bad_rows)
-        if location[0] == "wheel_angle":
+        if location[0] in COUNTED:
             values = counters.angle(key, column, values)
-        if location[0] == "wheel_speed":
+        if TABLE[location[0]].integral in COUNTED:
             values = counters.speed(key, column, values)
         values = values * column.factor
-        if location[0] in SIDED:
+        if location[0] in BEHIND_GEAR:
             values = values / _divisor(column, key, robot or options.gear_ratio, location[1], table.source)
         width = len(components(location[0], wheels))
         channels.setdefault(location[0], np.full((len(table), width), np.nan))[:, location[1]] = values

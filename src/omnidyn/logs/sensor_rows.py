@@ -7,7 +7,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.clocks import samples, usual_step
 from omnidyn.logs.segments import GAP
-from omnidyn.run import SENSORS, Run
+from omnidyn.run import Run
+from omnidyn.sensors import OF_WHEELS, SENSORS
 
 
 def on_clock_of(run: Run, channel: str) -> Run:
@@ -31,7 +32,7 @@ def on_clock_of(run: Run, channel: str) -> Run:
 
 def on_clock_of_wheels(run: Run) -> Run:
     """The same in the rows in which the wheels were sampled: their speed, else their angle."""
-    return on_clock_of(run, "wheel_speed" if run.wheel_speed is not None else "wheel_angle")
+    return on_clock_of(run, next((name for name in OF_WHEELS if getattr(run, name) is not None), OF_WHEELS[0]))
 
 
 def _on_line(t: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:

@@ -29,6 +29,7 @@ from omnidyn.report.html import Section, beside, bullets, content, figure, page,
 from omnidyn.report.misfit_section import draw_misfit
 from omnidyn.report.style import Picture
 from omnidyn.run import Run
+from omnidyn.sensors import COUNTED
 
 Fits = Mapping[str, OutputErrorEstimate]
 Bands = tuple[Comparison, Comparison | None]
@@ -232,7 +233,7 @@ def _noise(fit: OutputErrorEstimate, scores: Mapping[str, Score], comparison: Co
         if name not in fit.noise:
             continue
         noise[key] = fit.noise[name]
-        if score is not None and score.chi2 and component_channel(key) == "wheel_angle":
+        if score is not None and score.chi2 and component_channel(key) in COUNTED:
             noise[key] = math.sqrt(float(np.mean(residuals_of(comparison, key) ** 2)) / score.chi2)
     return noise
 

@@ -44,11 +44,11 @@ def draw_friction(studies: Mapping[str, FrictionStudy], axis: int = 0) -> Pictur
                 panels[1].plot([0.0, 0.0], [-curves.holds[1], curves.holds[0]], color=colour, linestyle=line)
             panels[2].plot(curves.rate, curves.breakaway, color=colour, linestyle=line, marker=".")
         unit = next(iter(studies.values())).axes[axis].unit
-        speed, way = ("rad/s", "mrad") if unit == "N m" else ("m/s", "mm")
+        speed, distance = ("rad/s", "mrad") if unit == "N m" else ("m/s", "mm")
         for panel, title, below in zip(
             panels,
             (f"force: {unit}", f"slow loop: {unit}", f"breakaway: {unit}"),
-            (f"speed, {speed}", f"way, {way}", f"rate of the force, {unit}/s"),
+            (f"speed, {speed}", f"way, {distance}", f"rate of the force, {unit}/s"),
             strict=True,
         ):
             panel.set_title(title)

@@ -201,7 +201,7 @@ class Coulomb(_Stepping):
         rows, edges = self._rows(state, commands), np.zeros(len(commands.dt) + 1)
         np.cumsum(commands.dt, out=edges[1:])
         step = step.copy() if step[0] else rows.dt[:1].copy()
-        way, late = np.array([pose[2], 0.0, 0.0, pose[0], pose[1]]), np.zeros(1)
+        start_travel, late = np.array([pose[2], 0.0, 0.0, pose[0], pose[1]]), np.zeros(1)
         if looped:
             gains, none = np.array(loop_gains(self._robot)), np.zeros((0, 4, self._robot.wheels.count))
             run_of_loop = run_looped(
@@ -216,7 +216,7 @@ class Coulomb(_Stepping):
                 step,
                 self._tol,
                 late,
-                way,
+                start_travel,
                 None if self._push is None else np.array(self._push),
             )
             seen = run_of_loop.seen
@@ -224,7 +224,17 @@ class Coulomb(_Stepping):
         else:
             push = None if self._push is None else np.tile(self._push, (len(rows.dt), 1))
             seen = run(
-                self._moved, edges, rows.dt, rows.voltage, twist, step, self._tol, late, way, push, bound=rows.bound
+                self._moved,
+                edges,
+                rows.dt,
+                rows.voltage,
+                twist,
+                step,
+                self._tol,
+                late,
+                start_travel,
+                push,
+                bound=rows.bound,
             )
         twists, poses = seen.twist[0], seen.way[0][:, [PATH, PATH + 1, 0]]
         twists[0], poses[0] = twist, pose

@@ -17,11 +17,10 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.model.actuation import Driver, at_motors, mapped
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
+from omnidyn.sensors import OUTPUTS
 from omnidyn.simulation.commands import Commands
 from omnidyn.simulation.delays import StepGrid, clock
 
-# The first sets where a start is.
-LATE_CHANNELS = ("twist", "wheel_speed", "current", "heading", "position", "wheel_angle")
 DIGITS = 12  # of a second: latenesses that differ by less are one
 
 
@@ -105,7 +104,7 @@ def seen_through(
     dt, drive, row = held_commands.dt, robot.drive.latency, float(np.median(held_commands.dt))
     if share is None:
         share = np.concatenate([[0.0], np.cumsum(dt[:-1])]) / float(np.sum(dt))
-    late = late or {name: log.latency.of(name, drive, row) for name in LATE_CHANNELS}
+    late = late or {name: log.latency.of(name, drive, row) for name in OUTPUTS}
     main = drive if start is None else start
     late = {name: round(delay - main, DIGITS) for name, delay in late.items()}
     apart = sorted({0.0, *late.values()})

@@ -47,12 +47,12 @@ def _cause(statement: Statement) -> str:
 
 def _how_to(statement: Statement) -> str:
     """What to do about a cause."""
-    key, way = statement.subject, statement.numbers["way"]
-    if way == "distinguish":
+    key, kind = statement.subject, statement.numbers["way"]
+    if kind == "distinguish":
         group = {place.name if (place := find_key(name)) else name for name in (key, *statement.numbers["same_as"])}
         ways = [words for name, words in MEASURED.items() if name in group] or ["measure one of them"]
         return f"{' or '.join(ways)}, or record what tells them apart (currents, another load)"
-    return WAYS[way].format(key=key)
+    return WAYS[kind].format(key=key)
 
 
 def _guesses(statement: Statement) -> str:
@@ -104,8 +104,8 @@ def _wide_by_misfit(statement: Statement) -> str:
 def _known_roughly(statement: Statement) -> str:
     numbers = statement.numbers
     return ", ".join(
-        f"{name} is known within {short(100.0 * share, '.0f')} % only" if known else f"{name} is not known"
-        for name, share, known in zip(numbers["keys"], numbers["shares"], numbers["known"], strict=True)
+        f"{name} is known within {short(100.0 * share, '.0f')} % only" if determined else f"{name} is not known"
+        for name, share, determined in zip(numbers["keys"], numbers["shares"], numbers["known"], strict=True)
     )
 
 

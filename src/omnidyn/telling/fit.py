@@ -200,8 +200,8 @@ def _combined(name: str, parts: str) -> Callable[[Statement], str]:
         """A number that the logs determine where they do not determine those behind it."""
         between = statement.numbers["correlation"]
         trade = "" if between is None else f", which trade with each other (correlation {between:.2f})"
-        way = "about yaw" if statement.subject == "yaw" else f"along {statement.subject}"
-        return f"{name} {way}: {parts}{trade}"
+        axis = "about yaw" if statement.subject == "yaw" else f"along {statement.subject}"
+        return f"{name} {axis}: {parts}{trade}"
 
     return words
 

@@ -90,20 +90,20 @@ def _lines(finding: Finding) -> str:
 
 def _excited(excitation: Mapping[str, float]) -> Words:
     """What the log excites; no words where nothing was measured."""
-    known = {name: value for name, value in excitation.items() if math.isfinite(value)}
+    finite = {name: value for name, value in excitation.items() if math.isfinite(value)}
     parts = []
-    if "moving" in known:
-        seconds = short(known.get("time_s", math.nan), ".3g")
-        parts.append(f"in motion for {100.0 * known['moving']:.0f} % of {seconds} s")
+    if "moving" in finite:
+        seconds = short(finite.get("time_s", math.nan), ".3g")
+        parts.append(f"in motion for {100.0 * finite['moving']:.0f} % of {seconds} s")
     for axis, unit in (("x", "m/s"), ("y", "m/s"), ("yaw", "rad/s")):
-        if axis in known:
-            parts.append(f"{axis} {known[axis]:.3g} {unit} rms, up to {known.get(f'{axis}_max', math.nan):.3g}")
-    if "turning" in known:
-        parts.append(f"turning in {100.0 * known['turning']:.0f} % of the motion")
-    if "directions" in known:
-        parts.append(f"directions {known['directions']:.0f} of {SECTORS}")
-    if "speeds" in known:
-        parts.append(f"speeds a factor of {known['speeds']:.2g} apart")
+        if axis in finite:
+            parts.append(f"{axis} {finite[axis]:.3g} {unit} rms, up to {finite.get(f'{axis}_max', math.nan):.3g}")
+    if "turning" in finite:
+        parts.append(f"turning in {100.0 * finite['turning']:.0f} % of the motion")
+    if "directions" in finite:
+        parts.append(f"directions {finite['directions']:.0f} of {SECTORS}")
+    if "speeds" in finite:
+        parts.append(f"speeds a factor of {finite['speeds']:.2g} apart")
     return Words("motion     " + "; ".join(parts) if excitation else "", "  ", INDENT)
 
 

@@ -12,7 +12,7 @@ FULL = {"supply": "the supply", "voltage_limit": "the voltage limit (the file ha
 def _starts_to_move(statement: Statement) -> str:
     """From which voltage of the most loaded motor a robot moves, which way, and what its motors never reach."""
     ways, volts, stuck = (statement.numbers[name] for name in ("ways", "volts", "stuck"))
-    words = all_of([f"{way} from {level:.2f} V" for way, level in zip(ways, volts, strict=True)])
+    words = all_of([f"{direction} from {level:.2f} V" for direction, level in zip(ways, volts, strict=True)])
     never = f"; {all_of(stuck)} its motors cannot move it" if stuck else ""
     return f"the robot {statement.subject} starts to move {words}{never}"
 
@@ -36,9 +36,9 @@ def _dead_zone_rests_on_guesses(statement: Statement) -> str:
     """Guesses that the dead zone, or its duty, rests on; by how much, where they have a std."""
     numbers = statement.numbers
     pairs = [*zip(numbers["keys"], numbers["effects"], strict=True)]
-    known = [f"{key} ({short(100.0 * effect)} % by its std)" for key, effect in pairs if effect is not None]
+    with_effect = [f"{key} ({short(100.0 * effect)} % by its std)" for key, effect in pairs if effect is not None]
     bare = [f"{key} (no std: in no interval)" for key, effect in pairs if effect is None]
-    return f"{'the duty' if numbers['duty'] else 'it'} rests on guesses: {', '.join([*known, *bare])}"
+    return f"{'the duty' if numbers['duty'] else 'it'} rests on guesses: {', '.join([*with_effect, *bare])}"
 
 
 def _slip(statement: Statement) -> str:

@@ -32,8 +32,8 @@ def _motor_line(statement: Statement) -> str:
     elif numbers["lag_seen"]:
         words += f", lag {1e3 * numbers['lag']:.3g} ms"
     for channel, late, std in numbers["late"]:
-        known = "ms (the end of what was searched: not determined)" if std is None else f"+- {1e3 * std:.2g} ms"
-        words += f", {channel} late by {1e3 * late:.3g} {known}"
+        accuracy = "ms (the end of what was searched: not determined)" if std is None else f"+- {1e3 * std:.2g} ms"
+        words += f", {channel} late by {1e3 * late:.3g} {accuracy}"
     if rows := numbers["left_out"]:
         words += f" ({rows} rows left out: their input changes too much from row to row)"
     return "; ".join(map(str, [words, numbers["dead_band"], *([numbers["offset"]] if numbers["offset"] else [])]))
@@ -96,11 +96,11 @@ def _dead_band_bounded(statement: Statement) -> str:
     numbers = statement.numbers
     (low, high), unit, value = numbers["ci95"], numbers["unit"], numbers["value"]
     between = f"between {low:.3g} and {high:.3g}" if low > 0.0 else f"at most {high:.3g}"
-    known = f"; it is {between} {unit}, because it turned steadily at that input" if math.isfinite(high) else ""
+    bound = f"; it is {between} {unit}, because it turned steadily at that input" if math.isfinite(high) else ""
     if math.isfinite(value):
-        return f"{NOT_IDENTIFIABLE}: {value:.3g} {unit} is no estimate{known}"
-    told = "with one speed or one input only they are not distinguishable"
-    return f"{NOT_IDENTIFIABLE}, and any dead band is part of the slope: {told}{known}"
+        return f"{NOT_IDENTIFIABLE}: {value:.3g} {unit} is no estimate{bound}"
+    reason = "with one speed or one input only they are not distinguishable"
+    return f"{NOT_IDENTIFIABLE}, and any dead band is part of the slope: {reason}{bound}"
 
 
 def _dead_band_seen(statement: Statement) -> str:
@@ -202,7 +202,7 @@ def _starts_both_ways(statement: Statement) -> str:
     """A motor whose starts were seen in both directions."""
     numbers = statement.numbers
     unit, ways = numbers["unit"], zip(numbers["levels"], numbers["directions"], strict=True)
-    return f"{statement.subject} starts at {all_of([f'{level:.3g} {unit} ({way})' for level, way in ways])}"
+    return f"{statement.subject} starts at {all_of([f'{level:.3g} {unit} ({direction})' for level, direction in ways])}"
 
 
 def _motors_start(statement: Statement) -> str:

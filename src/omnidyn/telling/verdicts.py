@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from omnidyn.document import all_of, short
 from omnidyn.model.keys import in_words
+from omnidyn.sensors import COUNTED
 from omnidyn.statement import Statement
 from omnidyn.telling.lack_of_fit import names_of
 from omnidyn.telling.sentence import Sentence
@@ -18,11 +19,11 @@ def _numbers_known(statement: Statement) -> str:
     count, missing, widest = numbers["count"], numbers["missing"], numbers["widest"]
     if len(missing) == count:
         return f"no number is known{f': not {names_of(missing)}' if missing else ''}"
-    known = f"{count - len(missing)} of" if missing else "all"
+    share = f"{count - len(missing)} of" if missing else "all"
     within = f"within {short(max(0.1, 100.0 * numbers['share']))} %"
     if count == 1:
         return f"{in_words(widest)} is known {within}"
-    words = f"{known} {count} numbers are known, the widest ({in_words(widest)}) {within}"
+    words = f"{share} {count} numbers are known, the widest ({in_words(widest)}) {within}"
     return f"{words}; not known: {names_of(missing)}" if missing else words
 
 
@@ -54,7 +55,7 @@ def _records(statement: Statement) -> str:
     words = []
     for channel, std in statement.numbers["noise"].items():
         sizes = ", ".join(f"{size:.2g}" for size in dict.fromkeys(std.tolist()))
-        words.append(f"{channel} in counts of {sizes} rad" if channel == "wheel_angle" else f"{channel} +- {sizes}")
+        words.append(f"{channel} in counts of {sizes} rad" if channel in COUNTED else f"{channel} +- {sizes}")
     return f"predicted for a log of {all_of(words)}, at {statement.numbers['rate']:.4g} Hz; log less, and it tells less"
 
 
@@ -141,8 +142,8 @@ def _shapes(statement: Statement) -> str:
 
 def _of_groups(statement: Statement) -> str:
     """How well the numbers of each group are known."""
-    groups, known = statement.numbers["groups"], statement.numbers["known"]
-    return "; ".join(f"{g}: {k}" if len(known) > 1 else str(k) for g, k in zip(groups, known, strict=True))
+    groups, sentences = statement.numbers["groups"], statement.numbers["known"]
+    return "; ".join(f"{g}: {k}" if len(sentences) > 1 else str(k) for g, k in zip(groups, sentences, strict=True))
 
 
 SENTENCES = {

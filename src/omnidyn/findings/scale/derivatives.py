@@ -31,6 +31,7 @@ from omnidyn.findings.signal.robust import Slope, central_rate, slope, smooth, w
 from omnidyn.findings.time_base import LONGEST_STEP, SHORTEST_STEP
 from omnidyn.logs.channels import components
 from omnidyn.model.frames import unwrapped
+from omnidyn.sensors import FROM_START
 from omnidyn.statement import ERROR, WARNING
 
 LEAST_DEVIATION, SURE_ERRORS = 0.03, 6.0  # of the ratio; standard errors
@@ -62,7 +63,7 @@ def check_derivatives(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck
     """Findings on positions and their speeds; the work with the wrong one of them put right."""
     if len(work) < MIN_ROWS or not SHORTEST_STEP <= work.step <= LONGEST_STEP:
         return [], work
-    if work.get("pose") is None and work.get("wheel_angle") is None:
+    if all(work.get(name) is None for name in FROM_START):
         return [], work
     lines = [line for pairs in PAIRS for line in _lines(work, pairs)]
     ratios = np.array([line.value for _, line in lines])

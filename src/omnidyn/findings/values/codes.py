@@ -9,8 +9,9 @@ from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.robust import quantum, sample, spread
 from omnidyn.logs.channels import place
-from omnidyn.logs.columns.mapping import SIDED, component_channel
+from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.logs.log import MAX_MISSING
+from omnidyn.sensors import BEHIND_GEAR, SENSORS
 from omnidyn.statement import ERROR, WARNING
 from omnidyn.statistics import robust_std
 
@@ -94,14 +95,13 @@ def _cell_size(work: LogUnderCheck, component: str) -> float:
     column = work.log.columns.columns.get(component)
     if column is None:
         return 1.0
-    if work.robot is None or component_channel(component) not in SIDED:
+    if work.robot is None or component_channel(component) not in BEHIND_GEAR:
         return column.factor
     return column.factor / column.divisor(work.robot, place(component)[1])  # type: ignore[index]
 
 
 # Single values far away from both neighbours, judged by the rows in which a channel was recorded
 
-MEASURED = ("current", "wheel_speed", "wheel_angle", "twist", "pose", "supply")
 SPIKE = 10.0  # a single value so many times the noise away from both its neighbours
 
 
@@ -109,7 +109,7 @@ def check_spikes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Single values (or two) far away from both neighbours, which agree with each other."""
     findings = []
     changes = _spikes_changed(work)
-    for channel in MEASURED:
+    for channel in (*SENSORS, "supply"):
         for component, values in work.sampled_columns(channel):
             k = place(component)[1]  # type: ignore[index]
             recorded_rows = work.recorded(channel, k)

@@ -12,9 +12,10 @@ from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import expected_wheel_speed
 from omnidyn.findings.signal.robust import quantum, white_noise
 from omnidyn.logs.channels import components
+from omnidyn.sensors import COUNTED, SENSORS
 from omnidyn.statement import ERROR, NOTE
 
-MEASURED = ("wheel_angle", "wheel_speed", "current", "twist")
+MEASURED = tuple(name for name in SENSORS if name != "pose")
 VALUES = 20  # different ones, at least: fewer may agree by chance
 OPPOSITE = -0.9  # correlation of two that turn against each other
 DIFFERENT = 0.1  # of the larger of two inputs, by which they differ
@@ -64,7 +65,7 @@ def _reason(work: LogUnderCheck, channel: str, j: int, k: int) -> str:
             return expected[0]
     values = work.channels[channel][:, j]
     largest = float(np.nanmax(np.abs(values)))
-    return "noise" if channel != "wheel_angle" and not quantum(values) and white_noise(values) > NOISY * largest else ""
+    return "noise" if channel not in COUNTED and not quantum(values) and white_noise(values) > NOISY * largest else ""
 
 
 def _differ(values: FloatArray | None, j: int, k: int) -> bool:

@@ -194,7 +194,7 @@ class _RowWalk:
         self.gaps = np.concatenate([[0], np.cumsum(~self.good)])
         self.holes = self.gaps + np.concatenate([[0], np.cumsum(repeated)])
         self.step, self.top = quantum(values), float(np.nanmax(np.abs(values)))
-        self.known: dict[int, tuple[float, IntArray, FloatArray, FloatArray]] = {}
+        self.by_length: dict[int, tuple[float, IntArray, FloatArray, FloatArray]] = {}
 
     def _range(self, starts: IntArray, length: int) -> FloatArray:
         """Range of the means over parts of each stretch."""
@@ -209,9 +209,9 @@ class _RowWalk:
         """
         # Lengths in classes a fifth apart; the next shorter, whose means are noisier.
         length = max(PARTS, int(1.2 ** math.floor(math.log(b - a, 1.2))))
-        if length not in self.known:
-            self.known[length] = self._others(length)
-        clean, starts, before, behind = self.known[length]
+        if length not in self.by_length:
+            self.by_length[length] = self._others(length)
+        clean, starts, before, behind = self.by_length[length]
         if np.isfinite(clean):
             return clean
         first, last = np.searchsorted(starts, [a - 2 * length, b + length])

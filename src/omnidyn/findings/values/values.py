@@ -20,10 +20,11 @@ from omnidyn.findings.signal.robust import HELD_HEADING, quantum, smooth, turned
 from omnidyn.findings.values.codes import check_codes, check_spikes
 from omnidyn.findings.values.stuck import check_stuck
 from omnidyn.logs.channels import components, place
-from omnidyn.logs.columns.mapping import SIDED, component_channel
+from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.logs.log import MAX_MISSING
 from omnidyn.logs.read_log import driven_way
 from omnidyn.model.wheels import twist_from_wheel_speed
+from omnidyn.sensors import BEHIND_GEAR, OF_WHEELS
 from omnidyn.statement import ERROR, NOTE, WARNING
 from omnidyn.statistics import moving
 from omnidyn.units import known_unit
@@ -169,7 +170,7 @@ def _in_column(work: LogUnderCheck, component: str, step: float) -> dict[str, ob
     if column is None or unit is None:
         return {}
     size = unit.size
-    if work.robot is not None and component_channel(component) in SIDED:
+    if work.robot is not None and component_channel(component) in BEHIND_GEAR:
         size /= column.divisor(work.robot, place(component)[1])  # type: ignore[index]
     details = {"step_in_column": step / size, "unit": unit.text, "column": column.name}
     return {} if abs(size - 1.0) < 1e-9 else details
@@ -217,7 +218,7 @@ def _should_move(work: LogUnderCheck, channel: str, k: int, all_flat: bool) -> s
             if values is not None and k < values.shape[1] and _moves(values[:, k]):
                 return drive
         return "other_motors" if not all_flat and _wheel_moves(work, k) else ""
-    if channel in ("wheel_speed", "wheel_angle"):
+    if channel in OF_WHEELS:
         return _wheel_reason(work, channel, k)
     if channel == "twist" and not all_flat:
         speed, robot = work.full("wheel_speed"), work.geometry
@@ -242,7 +243,7 @@ def _should_move(work: LogUnderCheck, channel: str, k: int, all_flat: bool) -> s
 
 def _behind(work: LogUnderCheck, channel: str) -> tuple[str, ...]:
     """The keys of the robot file behind a reason of `_should_move`."""
-    if channel in ("wheel_speed", "wheel_angle"):
+    if channel in OF_WHEELS:
         expected = expected_wheel_speed(work, without=channel)
         return () if expected is None else keys_behind(expected[0])
     return GEOMETRY if channel in ("twist", "pose") and work.get("wheel_speed") is not None else ()
@@ -267,8 +268,8 @@ def spread_of_motion(values: FloatArray) -> float:
 
 def _driven(work: LogUnderCheck, k: int) -> bool:
     """Whether what gives an unsigned current its sign ever drives motor k."""
-    way, _ = driven_way(work.log, work.geometry)
-    return way is None or k >= way.shape[1] or bool((np.abs(way[:, k]) > 0.0).any())
+    distance, _ = driven_way(work.log, work.geometry)
+    return distance is None or k >= distance.shape[1] or bool((np.abs(distance[:, k]) > 0.0).any())
 
 
 def _wheel_moves(work: LogUnderCheck, k: int) -> bool:

@@ -19,9 +19,8 @@ from omnidyn.findings.signal.reference import CIRCUIT, CURRENT_AND_VOLTAGE, emf,
 from omnidyn.findings.wiring.floor import axes_finding, by_floor, check_frame, mended_axes, wheels_finding
 from omnidyn.findings.wiring.orders import Wiring, WiringChoice, choose, code_of, means, rivals_of, wirings
 from omnidyn.logs.channels import components
+from omnidyn.sensors import OF_MOTORS, OF_WHEELS
 from omnidyn.statement import ERROR
-
-MOTOR = ("voltage", "duty", "current", "wheel_angle", "wheel_speed", "wheel_speed_command")
 
 
 def check_wiring(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -44,7 +43,7 @@ def check_wiring(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     elif floor is not None:
         motors_trusted = circuit.known or (motor_known(work) and likeness is None)
         findings.append(wheels_finding(work, floor[1], "motors" if motors_trusted else "wheel_speed"))
-        work = _mended(work, MOTOR if motors_trusted else ("wheel_speed", "wheel_angle"), floor[1].best)
+        work = _mended(work, OF_MOTORS if motors_trusted else OF_WHEELS, floor[1].best)
         likeness = None if circuit.known else by_drive(work)
     if likeness is not None:
         findings.append(motor_finding(work, *likeness))

@@ -19,7 +19,7 @@ from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEsti
 from omnidyn.identification.output_error.combinations import combinations
 from omnidyn.identification.output_error.numbers_of_logs import key_of, latencies_like_zero, with_nuisances
 from omnidyn.identification.output_error.problem.friction_laws import coulomb_below, falls
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, TRAVELS, implausible
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, implausible
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Column, FitProblem, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
@@ -35,6 +35,7 @@ from omnidyn.model.keys import ROTOR, VISCOUS, WHEEL, Key, unit, with_priors
 from omnidyn.model.known.breakaway_levels import holding
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import JOINT, WITH_THE_FIT, Prior, Robot
+from omnidyn.sensors import TRAVEL
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 from omnidyn.statistics import difference_noise
 
@@ -184,7 +185,7 @@ def _measured(problem: FitProblem, column: Column) -> list[FloatArray]:
     pieces = [piece for piece in problem.pieces if column in piece.record.columns]
     parts = [piece.record.outputs[piece.first : piece.last + 1, piece.record.columns.index(column)] for piece in pieces]
     parts = [part[np.isfinite(part)] for part in parts]
-    return [part - part.mean() if column[0] in TRAVELS else part for part in parts if part.size]
+    return [part - part.mean() if column[0] in TRAVEL else part for part in parts if part.size]
 
 
 def _not_followed(missed_outputs: Mapping[str, float]) -> list[Statement]:

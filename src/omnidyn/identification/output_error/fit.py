@@ -32,7 +32,7 @@ from omnidyn.identification.output_error.prepare import (
     guesses,
 )
 from omnidyn.identification.output_error.problem.karnopp import band_note, with_band
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, TRAVELS, automatic, implausible
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.by_steps import FIT_PRECISION, solve_by_steps
@@ -335,7 +335,7 @@ class Fit:
         if not self._chooses:
             return solution
         chosen_solution = better_of(solution, self._plain(solution, progress))
-        adds_up = all(name in TRAVELS for name, _ in chosen_solution.solver.problem.columns)  # then no force is taken
+        adds_up = chosen_solution.solver.problem.travels.all()  # then no force is taken
         if adds_up or trust(chosen_solution.solver, chosen_solution, AUTO).kind != SANDWICH:
             return chosen_solution
         inner_progress = progress.aside("once more with a constant force")

@@ -27,6 +27,7 @@ from omnidyn.model.keys import find_key, with_priors
 from omnidyn.model.log_effects import Lateness, LogEffects, log_mark
 from omnidyn.model.robot import JOINT, WITH_THE_FIT, Prior, Robot
 from omnidyn.run import Run
+from omnidyn.sensors import COUNTED, OF_WHEELS
 from omnidyn.statistics import robust_std
 
 LATENCY_ERRORS = 2.0  # standard errors within which a latency is like none
@@ -65,7 +66,7 @@ def with_nuisances(
 
     std: of the parameters by name; open_names: those that the data do not determine, which only go with the others.
     """
-    angles = any(name == "wheel_angle" for name, _ in problem.columns)
+    angles = any(name in COUNTED for name, _ in problem.columns)
     if problem.robot_count == len(problem.parameters) and not angles and robot.log is None:
         return robot
     value_by_name = {p.name: float(v) for p, v in zip(problem.parameters, values, strict=True)}
@@ -164,8 +165,8 @@ def _poses(runs: Sequence[Run]) -> dict[str, float]:
 
 def _added_up(run: Run, latency_by_channel: Mapping[str, float]) -> bool:
     """Whether wheel speeds of a run are those of counts: its angles, or what its speeds add up to, are fitted."""
-    one_of_both = (run.wheel_angle is None) != (run.wheel_speed is None)
-    return "wheel_angle" in latency_by_channel and one_of_both and len(run) > 1
+    one_of_both = sum(getattr(run, name) is not None for name in OF_WHEELS) == 1
+    return any(name in latency_by_channel for name in COUNTED) and one_of_both and len(run) > 1
 
 
 def loss_words(loss: str) -> str:

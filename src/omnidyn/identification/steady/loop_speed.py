@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from omnidyn.findings.needs import turns_known
 from omnidyn.model.dynamics import state_space
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
@@ -39,7 +40,7 @@ def why_no_transient(runs: Sequence[Run], robot: Robot) -> str:
     They are where the loop is seen settling, and where a current or a speed is missing: then the steady state does not
     tell either.
     """
-    if any(run.current is None or (run.wheel_speed is None and run.wheel_angle is None) for run in runs):
+    if any(run.current is None or not turns_known(run) for run in runs):
         return ""
     settled_time = SETTLING_CONSTANTS * settling_time(robot)
     row = min(run.step for run in runs)

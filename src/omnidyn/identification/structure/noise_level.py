@@ -27,10 +27,11 @@ from omnidyn.identification.lack_of_fit import HOLDS, NEIGHBOURS, REPEATS, REST,
 from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion
 from omnidyn.identification.output_error.linear.rows import TINY, FitRows, Linear
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.output_error.problem.outputs import SPEEDS, TRAVEL
+from omnidyn.identification.output_error.problem.outputs import SPEEDS
 from omnidyn.identification.structure.misfit import left_beside
 from omnidyn.identification.structure.residual_bins import unit_of
 from omnidyn.identification.structure.windows import ResidualWindows, Shown, shown
+from omnidyn.sensors import TRAVEL
 from omnidyn.statistics import sensor_step, stretches
 
 FALSE_SHARE = 0.002  # of right models in which the fit leaves more than the noise, all tests together

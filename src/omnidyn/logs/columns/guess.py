@@ -28,13 +28,14 @@ from omnidyn.logs.columns.guess_side import settle_side, take_sides
 from omnidyn.logs.columns.guess_time import take_time
 from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, unit_of, voltage_limit
 from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
-from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
+from omnidyn.logs.columns.mapping import ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import AGAIN, BRACKETS, read_name
 from omnidyn.logs.columns.plausible import beyond_range
 from omnidyn.logs.columns.wheel_numbers import BY_PLACES, wheel_numbers
 from omnidyn.logs.columns.wheels_by_motion import proposed_wheels
 from omnidyn.logs.table.table import FileTable
 from omnidyn.model.robot import Robot
+from omnidyn.sensors import BEHIND_GEAR
 from omnidyn.statement import ERROR, WARNING, Statement
 from omnidyn.units import COUNT, COUNT_RATE, Unit, known_unit, parse_unit
 from omnidyn.units import DUTY as DUTY_UNIT
@@ -265,7 +266,7 @@ def _enter(table: FileTable, name: str, component: str, unit: Unit, is_declared:
         guess.si.pop(name, None)
         return
     roles = read_name(name).roles
-    side = MOTOR_SIDE if component_channel(component) in SIDED and words.MOTOR in roles else WHEEL_SIDE
+    side = MOTOR_SIDE if component_channel(component) in BEHIND_GEAR and words.MOTOR in roles else WHEEL_SIDE
     guess.columns[component] = Column(name, unit.text, side)
 
 

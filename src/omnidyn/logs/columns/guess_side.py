@@ -10,10 +10,11 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
 from omnidyn.logs.columns.guessed import Guess
-from omnidyn.logs.columns.mapping import SIDED, component_channel
+from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.logs.table.table import FileTable
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
+from omnidyn.sensors import BEHIND_GEAR
 
 SAME_SIDE = 0.05  # commands of wheels and of the body agree within this share on one side of the gear only
 
@@ -38,7 +39,7 @@ def settle_side(table: FileTable, robot: Robot | None, guess: Guess) -> None:
     for side, factor in ((WHEEL_SIDE, 1.0), (MOTOR_SIDE, float(np.mean(gear)))):
         if abs(ratio / factor - 1.0) < SAME_SIDE and wheel_columns[0].side != side:  # type: ignore[union-attr]
             for component, column in guess.columns.items():
-                if component_channel(component) in SIDED and not column.of_rim:
+                if component_channel(component) in BEHIND_GEAR and not column.of_rim:
                     guess.columns[component] = Column(column.name, column.unit, side)
             guess.note("side_of_gear", side=side, ratio=ratio)
 

@@ -16,11 +16,11 @@ from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
 from omnidyn.logs.columns.doubts import Doubt
 from omnidyn.model.robot_file import toml_literal
 from omnidyn.model.wheels import MAX_WHEELS
+from omnidyn.sensors import BEHIND_GEAR
 from omnidyn.statement import Statement
 from omnidyn.units import ANGLE, CURRENT, DUTY, FORCE, LENGTH, SPEED, TURN_RATE, VOLTAGE, Unit, parse_unit
 from omnidyn.units import TIME as TIME_QUANTITY
 
-SIDED = ("wheel_angle", "wheel_speed", "wheel_speed_command")
 FRAMED = ("vx", "vy", "vx_cmd", "vy_cmd", "heading")
 SCHEMA = 1
 
@@ -57,7 +57,7 @@ class ColumnMap:
     def __post_init__(self) -> None:
         for component, column in self.columns.items():
             check_quantity(component, parse_unit(column.unit))
-            if column.side == MOTOR_SIDE and (component_channel(component) not in SIDED or column.of_rim):
+            if column.side == MOTOR_SIDE and (component_channel(component) not in BEHIND_GEAR or column.of_rim):
                 reason = "what is in metres is of the rim, behind the gear" if column.of_rim else ""
                 raise InputError(
                     reason or "only speeds and angles of wheels have a motor side",
@@ -139,7 +139,7 @@ def check_quantity(component: str, unit: Unit) -> None:
 
 def is_of_rim(component: str, unit: Unit) -> bool:
     """Whether a speed of a wheel is given in m/s, or its angle in m: that of its rim."""
-    return component_channel(component) in SIDED and _RIM.get(quantity_of(component)) == unit.quantity
+    return component_channel(component) in BEHIND_GEAR and _RIM.get(quantity_of(component)) == unit.quantity
 
 
 def parse_column(text: str, names: Sequence[str] = ()) -> tuple[str, Column]:

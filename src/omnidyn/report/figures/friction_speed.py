@@ -89,8 +89,8 @@ def _panel(axes: Axes, axis: int, curves: Mapping[str, FrictionCurve], driven: t
         axes.axvspan(*driven, color=PALE, alpha=0.6, linewidth=0.0, zorder=0, label="speeds in the logs (middle 90 %)")
     for (name, curve), colour, line in zip(curves.items(), COLOURS, LINES, strict=False):
         sides = [side for side in (curve.speed < 0.0, curve.speed > 0.0) if side.any()]
-        for k, way in enumerate(sides):
-            speed, force, half = curve.speed[way], curve.force[way], curve.half[way]
+        for k, direction in enumerate(sides):
+            speed, force, half = curve.speed[direction], curve.force[direction], curve.half[direction]
             if half.any():
                 axes.fill_between(
                     speed,

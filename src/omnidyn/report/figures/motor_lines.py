@@ -82,9 +82,9 @@ def _panel(
         label=WINDOWS,
     )
     reach = np.abs(speed).max()
-    for way in (-1.0, 1.0):
-        if (side * way > 0.0).any():
-            _direction(axes, way, reach, line, starts.get(way), curve)
+    for sign in (-1.0, 1.0):
+        if (side * sign > 0.0).any():
+            _direction(axes, sign, reach, line, starts.get(sign), curve)
     axes.axhline(0.0, color=INK, linewidth=0.6)
     axes.axvline(0.0, color=INK, linewidth=0.6)
     axes.set_title(line.name)
@@ -94,7 +94,7 @@ def _panel(
 
 def _direction(
     axes: Axes,
-    way: float,
+    sign: float,
     reach: float,
     line: MotorEstimate,
     start: MotorStart | None,
@@ -108,15 +108,15 @@ def _direction(
     if start is not None and all(map(math.isfinite, start.ci95[START])):
         (low, high), name = start.ci95[START], STARTS
     if curve is not None:
-        axes.plot(way * curve.speed, way * curve.level, "o-", color=BLUE, markersize=3.0, label=STEADY)
+        axes.plot(sign * curve.speed, sign * curve.level, "o-", color=BLUE, markersize=3.0, label=STEADY)
     else:
-        span = way * np.linspace(0.0, reach, 20)
-        axes.plot(span, slope * span + at_rest * way, color=BLUE, label=LINE)
+        span = sign * np.linspace(0.0, reach, 20)
+        axes.plot(span, slope * span + at_rest * sign, color=BLUE, label=LINE)
     if math.isfinite(low) and math.isfinite(high):
         # A mark of its own size: the interval of a start that is well known is thinner than any line.
         axes.plot(
             [0.0, 0.0],
-            [way * low, way * high],
+            [sign * low, sign * high],
             color=VERMILLION,
             linewidth=4,
             alpha=0.8,

@@ -58,8 +58,8 @@ def animate(run: Run, robot: Robot) -> Animation:
             where="run",
         )
     pose = np.column_stack([path.position, path.heading])
-    known = np.isfinite(pose).all(axis=1)
-    return Animation(moving_picture(robot, run.t[known], {robot.name: pose[known]}, pose[known, :2]))
+    rows = np.isfinite(pose).all(axis=1)
+    return Animation(moving_picture(robot, run.t[rows], {robot.name: pose[rows]}, pose[rows, :2]))
 
 
 def moving_picture(

@@ -24,6 +24,7 @@ from omnidyn.report.style import (
     picture,
     thin_out,
 )
+from omnidyn.sensors import COUNTED
 
 MOST_CHANNELS, LAGS, BINS, SPAN = 4, 20, 41, 4.5
 HEIGHT = 1.55  # inch, of a row
@@ -69,7 +70,7 @@ def draw_residuals(comparison: Comparison, noise: dict[str, float], name: str = 
             "(dashed); wider shoulders mean outliers. Right: bars beyond the grey band mean that errors last: "
             f"noise with a memory, or what the model misses. Noise: {sizes or 'not known'}."
         )
-        if any(component_channel(key) == "wheel_angle" for key in names):
+        if any(component_channel(key) in COUNTED for key in names):
             caption += " Rounding by an encoder adds to that of an angle, and makes it flat."
         return picture(name, f"What the model leaves{of}", caption, figure)
 

@@ -188,12 +188,12 @@ class Delays:
         assert self._next is not None
         count, steps, wheels = volts.shape
         past = self._past if len(self._past) == 1 else self._past[span]
-        known = np.concatenate([np.broadcast_to(past, (count, *past.shape[1:])), volts], axis=1)
-        self._next[span] = known[:, known.shape[1] - self._kept :]
+        commands = np.concatenate([np.broadcast_to(past, (count, *past.shape[1:])), volts], axis=1)
+        self._next[span] = commands[:, commands.shape[1] - self._kept :]
         out = np.empty((count, steps + 1, wheels))
         for rows, here in zip(self._rows, places, strict=True):
             first = self._kept - rows - 1
-            out[here] = known[here, first : first + steps + 1]
+            out[here] = commands[here, first : first + steps + 1]
         return out
 
     def go_on(self) -> None:

@@ -181,19 +181,19 @@ class LoopGroup:
         if len(rows) != len(past):
             rows = np.broadcast_to(rows, (self.count, *rows.shape[1:]))
             past = np.broadcast_to(past, (self.count, *past.shape[1:]))
-        known: FloatArray = np.concatenate([past, keeping.without_bad(rows, 0, self.count)], axis=1)
+        all_commands: FloatArray = np.concatenate([past, keeping.without_bad(rows, 0, self.count)], axis=1)
         grid, place = self._grid(steps)
 
         def march(span: tuple[int, int]) -> None:
-            pieces = self._pieces(grid, place, known, span)
+            pieces = self._pieces(grid, place, all_commands, span)
             moving = LoopRows(self._states, self._loops, keeping.fails)
             march_loops(*span, self._laws, self._gains, pieces, moving, keeping.record, self._rule)
 
         blocks = len(self._laws)
-        alone = len(known) == 1 and len(grid.command) == 1
-        size = WIDTH * grid.share.shape[1] * known.shape[2]
+        alone = len(all_commands) == 1 and len(grid.command) == 1
+        size = WIDTH * grid.share.shape[1] * all_commands.shape[2]
         threads.map(march, threads.spans(blocks, blocks if alone else max(1, VOLTS_AT_ONCE // size)))
-        past, self._done = known[:, known.shape[1] - self._kept :], self._done + steps
+        past, self._done = all_commands[:, all_commands.shape[1] - self._kept :], self._done + steps
         self._past = (past[:1] if (past == past[:1]).all() else past).copy()
         self._failed, run = keeping.end(self._states, self.count)
         return run
@@ -214,7 +214,7 @@ class LoopGroup:
         return TickGrid(share, ticks, index, first[1:] - 1), place.reshape(-1)
 
     def _cut(self, robot: Robot, done: int, steps: int) -> tuple[FloatArray, BoolArray, IntArray, IntArray]:
-        """(shares, ticks, which of the commands acts, counted in `known`) of pieces, and where each row begins."""
+        """(shares, ticks, which of the commands acts, counted in `all_commands`) of pieces, where rows begin."""
         dt = self.dt
         held = Commands(np.full(steps, dt), None, set_point=np.zeros((steps, 1)))
         lengths, _, tick, begins = on_ticks(robot, held, done * dt)
@@ -222,17 +222,21 @@ class LoopGroup:
         row = np.floor((start - robot.drive.latency) / dt + SAME_TIME).astype(np.int64)
         return np.round(lengths / dt, 12), tick, np.maximum(row + self._kept, 0), begins
 
-    def _pieces(self, grid: TickGrid, place: IntArray, known: FloatArray, span: tuple[int, int]) -> Pieces:
+    def _pieces(self, grid: TickGrid, place: IntArray, all_commands: FloatArray, span: tuple[int, int]) -> Pieces:
         """What the kernel takes, of some blocks."""
         lanes = np.minimum(np.arange(span[0] * WIDTH, span[1] * WIDTH), self.count - 1)
         mixed, blocks = len(grid.command) > 1, span[1] - span[0]
         both = np.stack([grid.share, grid.ticks], axis=2)  # (kinds, pieces, 2)
         chosen = both[place[lanes]] if mixed else np.repeat(both, WIDTH, axis=0)
         steps = chosen.reshape(blocks if mixed else 1, WIDTH, *both.shape[1:]).transpose(0, 2, 3, 1)
-        if len(known) == 1 and not mixed:
-            points = known[0, grid.command[0]][None, :, :, None]
+        if len(all_commands) == 1 and not mixed:
+            points = all_commands[0, grid.command[0]][None, :, :, None]
         else:
-            own = known if len(known) > 1 else np.broadcast_to(known, (self.count, *known.shape[1:]))
+            own = (
+                all_commands
+                if len(all_commands) > 1
+                else np.broadcast_to(all_commands, (self.count, *all_commands.shape[1:]))
+            )
             taken = np.take_along_axis(own[lanes], grid.command[place[lanes]][:, :, None], axis=1)
             points = taken.reshape(blocks, WIDTH, *taken.shape[1:]).transpose(0, 2, 3, 1)
         return Pieces(

@@ -190,7 +190,7 @@ def _differentiate_coulomb(
     robot, (twist, pose) = ready.robot, start
     bound = current_bounds(robot, held_commands, len(held_commands.dt))
     edges = np.concatenate([[0.0], np.cumsum(held_commands.dt)])
-    way, late = np.array([pose[2], 0.0, 0.0, pose[0], pose[1]]), np.zeros(1)
+    start_travel, late = np.array([pose[2], 0.0, 0.0, pose[0], pose[1]]), np.zeros(1)
     if held_commands.set_point is None:
         assert held_commands.voltage is not None
         voltage, dvolts, dt = held_commands.voltage, rates, held_commands.dt
@@ -203,7 +203,7 @@ def _differentiate_coulomb(
             dt[:1].copy(),
             tol,
             late,
-            way,
+            start_travel,
             None,
             [{"voltage": rate} for rate in rates],
             range(len(rates)),
@@ -225,7 +225,7 @@ def _differentiate_coulomb(
             dt[:1].copy(),
             tol,
             late,
-            way,
+            start_travel,
             None,
             np.repeat(rates, np.diff(keep), axis=1),
         )

@@ -51,8 +51,8 @@ def _summary(statement: Statement) -> str:
 
 def severities(counts: Mapping[str, Any]) -> str:
     """ "1 error, 3 warnings, 2 notes": those that there are; "no findings"."""
-    known = [counted(counts[severity], severity) for severity in SEVERITIES if counts[severity]]
-    return ", ".join(known) or "no findings"
+    counts_in_words = [counted(counts[severity], severity) for severity in SEVERITIES if counts[severity]]
+    return ", ".join(counts_in_words) or "no findings"
 
 
 def _lacking(text: str) -> Callable[[Statement], str]:

@@ -35,6 +35,8 @@ from omnidyn.identification.output_error.kernel.march_sums import (
 )
 from omnidyn.identification.output_error.kernel.pull import Room
 from omnidyn.identification.output_error.problem.heading import facing_at_start, headings, in_the_body
+from omnidyn.identification.output_error.problem.observation.observation import ExactRow
+from omnidyn.identification.output_error.problem.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.primitives import PrimitiveMap, Primitives
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import at_motors
@@ -361,18 +363,8 @@ def _maps(
     speed, travel = np.zeros((len(columns), N_AXES, *extra_shape)), np.zeros((len(columns), PATH, *extra_shape))
     volts = np.zeros((len(columns), *extra_shape))
     for c, (name, i) in enumerate(columns):
-        if name == "wheel_speed":
-            speed[c] = values_now.wheels[i]
-        elif name == "wheel_angle":
-            travel[c, :N_AXES] = values_now.wheels[i]
-        elif name == "current":
-            speed[c], volts[c] = values_now.braking[i], values_now.per_volt[i]
-        elif extra_shape:  # the twist and the pose themselves
-            continue
-        elif name == POSITION:
-            travel[c, N_AXES:] = body_to_world(start_heading)[i, : PATH - N_AXES]
-        else:
-            (speed if name == "twist" else travel)[c, i if name == "twist" else 2] = 1.0
+        row = ExactRow(speed[c], travel[c], volts[c : c + 1], bool(extra_shape))
+        OBSERVATIONS[name].exact(row, values_now, i, start_heading)
     return [speed, travel, volts]
 
 
@@ -389,7 +381,7 @@ def _at(used_indices: IntArray, values: FloatArray, total: int) -> FloatArray:
 
 
 def _wheel_of(columns: Sequence[Column]) -> IntArray:
-    return np.array([i if name == "current" else -1 for name, i in columns])
+    return np.array([i if OBSERVATIONS[name].has_volts else -1 for name, i in columns])
 
 
 def _blocks(piece: Piece, weighting: Weighting) -> int:

@@ -22,13 +22,15 @@ from omnidyn.identification.output_error.engines.engine import FitEngine
 from omnidyn.identification.output_error.engines.exact import HEADING, POSITION, PUSH, TILT
 from omnidyn.identification.output_error.engines.valley import bent
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
-from omnidyn.identification.output_error.problem.nuisances import TRAVELS
+from omnidyn.identification.output_error.problem.observation.observation import Shown
+from omnidyn.identification.output_error.problem.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
 from omnidyn.model.known.breakaway_levels import holding
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
+from omnidyn.sensors import TRAVEL
 from omnidyn.simulation.sensitivity.directions import EPS, difference
 from omnidyn.simulation.sensitivity.late_sample import (
     Direction,
@@ -38,7 +40,6 @@ from omnidyn.simulation.sensitivity.late_sample import (
     late_samples,
 )
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
-from omnidyn.simulation.travel import PATH, PLACE, TURN
 from omnidyn.statistics import difference_noise
 
 PATH_TOLERANCES = (1e-6, 1e-4)  # [m/s] where a path is fitted, and what a speed is off by adds up
@@ -47,7 +48,6 @@ PATH_ERROR = 2.5e-3  # [sqrt(s)] error of a path after a time T over tol sqrt(T)
 SPEED_TOLERANCE = 1e-5  # [m/s] that is asked for at the end of a fit to speeds; a path has that much more or less
 STEPS = 2  # a row, of derivatives at the end of a fit; it begins with one
 LEAST_TOL = 1e-5  # [m/s] of the run itself
-Shown = tuple[FloatArray, FloatArray, FloatArray]  # value (rows, m), its time derivative (rows, m), (rows, K, m)
 
 
 def path_tolerance(problem: Problem) -> float:
@@ -57,18 +57,11 @@ def path_tolerance(problem: Problem) -> float:
     finest, rows = np.inf, 0
     for record in {id(piece.record): piece.record for piece in problem.pieces}.values():
         for c, (name, _) in enumerate(record.columns):
-            if name in TRAVELS:
+            if name in TRAVEL:
                 rows += int(np.isfinite(record.outputs[:, c]).sum())
-                finest = min(finest, _reach(name, problem.robot) * _noise(record, c))
+                finest = min(finest, OBSERVATIONS[name].reach(problem.robot) * _noise(record, c))
     tol = PATH_SHARE * finest / (PATH_ERROR * np.sqrt(max(rows, 1) * max(longest, 1.0)))
     return float(np.clip(tol, *PATH_TOLERANCES))
-
-
-def _reach(name: str, robot: Robot) -> float:
-    """The way at the rim of a wheel [m] for each unit of an output that adds up."""
-    if name == POSITION:
-        return 1.0
-    return float(np.mean(robot.wheels.radii if name == "wheel_angle" else robot.wheels.robot_radius))
 
 
 def _noise(record: Record, c: int) -> float:
@@ -116,7 +109,7 @@ class ImplicitEngine(FitEngine[Problem]):
         """The engine of wheels that roll, or of wheels that may slip. tol [m/s]: where a path is fitted, as much finer
         as its sensors ask for."""
         kind = ImplicitEngine if problem.robot.wheels.traction_mu is None else SlipEngine
-        if tol is None or not any(name in TRAVELS for name, _ in problem.columns):
+        if tol is None or not problem.travels.any():
             return kind(problem, tol)
         return kind(problem, min(tol * path_tolerance(problem) / SPEED_TOLERANCE, max(tol, PATH_TOLERANCES[1])))
 
@@ -204,7 +197,7 @@ class ImplicitEngine(FitEngine[Problem]):
             np.multiply(channel_slopes[:, :, i], factors, out=slopes[c, :, :keys])
             if latency_indices[c] >= 0:
                 slopes[c, :, slope_indices.index(latency_indices[c])] = -pace[:, i]
-            if piece.at_rest and name != "current":  # before its first row it was at rest, too
+            if piece.at_rest and not OBSERVATIONS[name].has_volts:  # before its first row it was at rest, too
                 rows_before_start = t - t[0] < latencies[c]
                 residual[c][rows_before_start], slopes[c, rows_before_start] = (
                     measured[c][rows_before_start] - state[N_AXES + c],
@@ -288,18 +281,7 @@ class ImplicitEngine(FitEngine[Problem]):
     def _shown(self, samples: list[LateSample], number: int, name: str, start_heading: float) -> Shown:
         """What a channel of m columns shows at latency `number`, from the start; start_heading: the heading there
         [rad]."""
-        sample = samples[number]
-        if name == POSITION:
-            return sample.position(start_heading)
-        if name == "twist":
-            return sample.twist, sample.pace, sample.dtwist
-        channels = {
-            "heading": sample.heading,
-            "wheel_speed": sample.wheel_speeds,
-            "wheel_angle": sample.wheel_angles,
-            "current": sample.currents,
-        }
-        return channels[name]()
+        return OBSERVATIONS[name].sampled(samples[number], start_heading)
 
     def _directions(
         self, robot: Robot, moved: list[Direction], scales: list[float], piece: Piece, values: FloatArray
@@ -360,5 +342,4 @@ def through_the_end(commands: FloatArray) -> FloatArray:
 
 def travel_of(columns: Sequence[Column]) -> int:
     """What these outputs take of the way of a run, see simulation/sensitivity/sample.py."""
-    names = {name for name, _ in columns}
-    return PLACE if POSITION in names else PATH if "wheel_angle" in names else TURN
+    return max(OBSERVATIONS[name].travel for name, _ in columns)

@@ -11,7 +11,9 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.driver import LATENCY_PREFIX
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, Shown, through_the_end, travel_of
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, through_the_end, travel_of
+from omnidyn.identification.output_error.problem.observation.observation import Shown
+from omnidyn.identification.output_error.problem.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
@@ -105,8 +107,8 @@ class LoopEngine(ImplicitEngine):
     def _shown(self, samples: list[LateSample], number: int, name: str, start_heading: float) -> Shown:
         """As of any run; a current that jumps from tick to tick changes by what it does within a period."""
         value, pace, channel_slopes = super()._shown(samples, number, name, start_heading)
-        if name == "current" and samples[-1].late < samples[number].late:
-            pace = (samples[-1].currents()[0] - value) / self._period
+        if OBSERVATIONS[name].has_volts and samples[-1].late < samples[number].late:
+            pace = (super()._shown(samples, -1, name, start_heading)[0] - value) / self._period
         return value, pace, channel_slopes
 
     @property

@@ -15,10 +15,12 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.driver import driver_of
 from omnidyn.identification.output_error.problem.heading import HEADING, facing_at_start
+from omnidyn.identification.output_error.problem.observation.observation import Along
+from omnidyn.identification.output_error.problem.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors, without_map
 from omnidyn.model.drive import SPEED
-from omnidyn.model.dynamics import acceleration, settled_currents
+from omnidyn.model.dynamics import acceleration
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.motor import per_wheel, settled_current
@@ -83,34 +85,10 @@ class DrivenMotion:
     def shown(self, change: FloatArray) -> FloatArray:
         """What the columns show of a change of the twist (n, K, 3). Shape (C, n, K)."""
         columns = self.piece.record.columns
-        channels = {name: self._channel(name, change) for name in dict.fromkeys(name for name, _ in columns)}
+        along = Along(self.robot, self.t, self.twist, self.pose, self.rolls)
+        names = dict.fromkeys(name for name, _ in columns)
+        channels = {name: OBSERVATIONS[name].changed(along, change) for name in names}
         return np.stack([channels[name][..., i] for name, i in columns])
-
-    def _channel(self, name: str, change: FloatArray) -> FloatArray:
-        """What all components of a channel show of a change of the twist (n, K, 3). Shape (n, K, components)."""
-        if name == "twist":
-            return change
-        if name == "wheel_speed":
-            return wheel_speed(self.robot.wheels, change) * self.rolls[:, None, :]
-        if name == "current":
-            return settled_currents(self.robot, change, np.zeros(self.robot.wheels.count)) * self.rolls[:, None, :]
-        step = np.diff(self.t)[:, None, None]
-        if name == "wheel_angle":
-            return _added_up(wheel_speed(self.robot.wheels, change) * self.rolls[:, None, :], step)
-        path = _added_up(change, step)
-        return path[..., YAW:] if name == "heading" else self._position(change, path[..., YAW])
-
-    def _position(self, change: FloatArray, angles: FloatArray) -> FloatArray:
-        c, s = np.cos(self.pose[:, 2])[:, None], np.sin(self.pose[:, 2])[:, None]
-        vx, vy = self.twist[:, :1], self.twist[:, 1:2]
-        east = c * (change[..., 0] - vy * angles) - s * (change[..., 1] + vx * angles)
-        north = s * (change[..., 0] - vy * angles) + c * (change[..., 1] + vx * angles)
-        return _added_up(np.stack([east, north], axis=-1), np.diff(self.t)[:, None, None])
-
-
-def _added_up(speed: FloatArray, step: FloatArray) -> FloatArray:
-    """The way of speeds (n, K, m) over rows of length step (n - 1, 1, 1)."""
-    return np.concatenate([np.zeros_like(speed[:1]), np.cumsum(0.5 * (speed[1:] + speed[:-1]) * step, axis=0)])
 
 
 def in_the_room(motion: DrivenMotion) -> FloatArray:

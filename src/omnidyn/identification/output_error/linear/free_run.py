@@ -18,7 +18,6 @@ from omnidyn.identification.output_error.linear.blocks import BLOCKS, BlockProdu
 from omnidyn.identification.output_error.linear.rows import FitRows, Linear, noise_models
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.bounded import bounded
-from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.selection.blocks import BlockComparison, compare_blocks
@@ -118,7 +117,7 @@ def free_run(
         if b >= TAIL:
             tail_residual = residual[block] - slopes[block] @ tail_step
             tail[b - TAIL] = np.bincount(column[block], tail_residual**2, len(white)) * variance
-    travels = np.array([name in TRAVELS for name, _ in problem.columns])
+    travels = problem.travels
     count = np.where(travels & ~travels.all(), 0.0, rows.added(lambda k, j: rows.masks[k][j]))
     return FreeRun(square, count, _spread(rows), bool(travels.all()), tail)
 

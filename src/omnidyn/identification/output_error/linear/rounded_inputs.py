@@ -33,12 +33,12 @@ from omnidyn.identification.output_error.linear.random_effects import share
 from omnidyn.identification.output_error.linear.rows import FitRows, lengths, solved_by, with_priors
 from omnidyn.identification.output_error.linear.sensitivity import as_weighed, members_of
 from omnidyn.identification.output_error.memory.whitening import Weighed
+from omnidyn.identification.output_error.problem.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.problem import FitProblem, Piece, Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.layout import N_AXES
-from omnidyn.model.motor import per_wheel
 from omnidyn.statement import WARNING, Statement
 
 HOLD_TIME = 0.1  # [s]
@@ -146,10 +146,9 @@ def _shown(motion: DrivenMotion, volts: FloatArray) -> FloatArray:
     robot = linear_part(motion.robot)
     per_volt = drive_wrench(robot, np.zeros(N_AXES), np.eye(robot.wheels.count))
     values = motion.shown_by(volts @ per_volt)
-    ohm = per_wheel(robot.motor.resistance, robot.wheels.count)
     for c, (name, i) in enumerate(motion.piece.record.columns):
-        if name == "current":
-            values[c] += volts[..., i] / ohm[i]
+        if OBSERVATIONS[name].has_volts:
+            values[c] += OBSERVATIONS[name].of_volts(robot, volts, i)
     return values
 
 

@@ -22,8 +22,8 @@ from omnidyn.identification.output_error.linear.rounding_noise import anew, of_r
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, Gains, autoregression
 from omnidyn.identification.output_error.memory.innovations import without_gaps
 from omnidyn.identification.output_error.memory.whitened import known_rows, moving_rows
-from omnidyn.identification.output_error.problem.outputs import TRAVEL
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
+from omnidyn.sensors import TRAVEL
 
 TINY = 1e-300
 EIGEN_TOLERANCE = 1e-10  # of the largest eigenvalue of columns of length 1: below it directions are one

@@ -31,11 +31,11 @@ from omnidyn.model.keys import DEAD_BAND as KEY_DEAD
 from omnidyn.model.keys import LATENCY as KEY_LATE
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import IDENTIFIED, Robot
+from omnidyn.sensors import TABLE, TRAVEL
 from omnidyn.statement import WARNING, Statement
 
 LATENCY, TILT, PUSH = "latency", "tilt", "push"
 NUISANCES = (LATENCY, GAIN, DEAD_BAND, FADE, TILT, PUSH)
-TRAVELS = ("heading", "position", "wheel_angle")  # outputs that count from an unknown start
 FILTER = (
     0.03  # [s] of a speed that was smoothed forwards and backwards: so early it shows what the voltage is yet to do
 )
@@ -119,8 +119,8 @@ def _of_file(robot: Robot, key: str, value: float) -> tuple[float, float] | None
 
 def _as_fitted(channel: str, channels: Sequence[str]) -> str:
     """Under which name a channel is fitted: speeds of wheels that are differences of counts are, as angles."""
-    added_up = channel == "wheel_speed" and channel not in channels and "wheel_angle" in channels
-    return "wheel_angle" if added_up else channel
+    integral = TABLE[channel].integral if channel in TABLE else ""
+    return integral if channel not in channels and integral in channels else channel
 
 
 def measured_channels(records: Sequence[Record]) -> list[str]:
@@ -197,7 +197,7 @@ def _piece(
     twist = twists[0] if twists else None
     whole_twist = next((each for each in twists if np.isfinite(each).any(axis=0).all()), twist)
     columns = record.columns
-    travels = np.array([name in TRAVELS for name, _ in columns])
+    travels = np.array([name in TRAVEL for name, _ in columns])
     rows = slice(first, min(first + LEAD, last + 1))
     guess = np.zeros(3) if twist is None else np.array([_mean(twist[rows, axis]) for axis in range(3)])
     if decide:

@@ -13,14 +13,12 @@ from omnidyn.identification.output_error.problem.differences import Differences,
 from omnidyn.identification.output_error.problem.redundant_channels import redundant
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+from omnidyn.sensors import COUNTED, MEASURED, OUTPUTS, PREDICTED, TABLE, TRAVEL
 from omnidyn.statement import NOTE, WARNING, Statement
 from omnidyn.statistics import find_tick
 
-OUTPUTS = ("twist", "wheel_speed", "current", "heading", "position", "wheel_angle")
-POSE, PARTS = "pose", ("heading", "position")
 SPEEDS = ("twist", "wheel_speed")
 LOG = "log"  # what a log without a name is called
-TRAVEL = ("heading", "position", "wheel_angle")
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +56,13 @@ def outputs_of(
     wanted_names = (
         wanted_names
         if wanted_names is None
-        else [part for name in wanted_names for part in (PARTS if name == POSE else (name,))]
+        else [part for name in wanted_names for part in (TABLE[name].outputs if name in TABLE else (name,))]
     )
     unknown = [name for name in wanted_names or () if name not in OUTPUTS]
     if unknown:
-        raise InputError("no such output", got=unknown[0], expected=", ".join((*OUTPUTS, POSE)), where="outputs")
+        raise InputError(
+            "no such output", got=unknown[0], expected=", ".join(dict.fromkeys((*OUTPUTS, *PREDICTED))), where="outputs"
+        )
     values_by_output = {name: value for name in OUTPUTS if (value := _measured(run, name)) is not None}
     unused_notes = [
         Statement("output_not_asked", NOTE, name)
@@ -88,7 +88,7 @@ def outputs_of(
     columns = tuple((name, i) for name, value in values_by_output.items() for i in range(value.shape[1]))
     ticks = tuple(
         0.0
-        if name != "wheel_angle"
+        if name not in COUNTED
         else float(given_tick[i])
         if given_tick is not None
         else _tick(values_by_output[name][:, i], tick_rad)
@@ -104,11 +104,9 @@ def outputs_of(
 
 def _measured(run: Run, name: str) -> FloatArray | None:
     """The channel of an output, None where nothing of it was measured."""
-    if name in PARTS:
-        value = None if run.pose is None else run.pose[:, 2:] if name == "heading" else run.pose[:, :2]
-    else:
-        value = getattr(run, name)
-    return value if value is not None and np.isfinite(value).any() else None
+    channel, columns = MEASURED[name]
+    value = getattr(run, channel)
+    return value[:, columns] if value is not None and np.isfinite(value[:, columns]).any() else None
 
 
 def _without_doubles(
@@ -134,7 +132,8 @@ def _counted(
     run: Run, values_by_output: dict[str, FloatArray], count_differences: Differences | None, notes: list[Statement]
 ) -> tuple[dict[str, FloatArray], FloatArray | None, BoolArray | None]:
     """(the outputs, speeds that are differences of counts as angles; ticks of these, rows before which one is lost)."""
-    if count_differences is None or "wheel_speed" not in values_by_output or "wheel_angle" in values_by_output:
+    rate = next((name for name in values_by_output if TABLE[MEASURED[name][0]].integral), "")
+    if count_differences is None or not rate or TABLE[rate].integral in values_by_output:
         return values_by_output, None, None
     tick = {"tick": float(np.median(count_differences.ticks))}
     if count_differences.reason is not None:
@@ -143,7 +142,7 @@ def _counted(
     angle, lost = added_up(run, count_differences)
     notes.append(Statement("counts_added_up", NOTE, run.source or LOG, tick))
     return (
-        {name: value for name, value in values_by_output.items() if name != "wheel_speed"} | {"wheel_angle": angle},
+        {name: value for name, value in values_by_output.items() if name != rate} | {TABLE[rate].integral: angle},
         count_differences.ticks,
         lost,
     )

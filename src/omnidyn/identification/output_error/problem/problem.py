@@ -12,6 +12,7 @@ from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.output_error.problem.parameters import AT, Parameter, robot_at
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.robot import Robot
+from omnidyn.sensors import TRAVEL
 
 Column = tuple[str, int]
 Parts = tuple[FloatArray, FloatArray, IntArray]  # residuals (C, rows), slopes (C, rows, U), which U among P and states
@@ -68,6 +69,11 @@ class FitProblem:
     def columns(self) -> tuple[Column, ...]:
         """All output columns of all records, each once."""
         return tuple(dict.fromkeys(column for piece in self.pieces for column in piece.record.columns))
+
+    @cached_property
+    def travels(self) -> BoolArray:
+        """Whether each column counts from an unknown start. Shape (columns,)."""
+        return np.array([name in TRAVEL for name, _ in self.columns])
 
     @cached_property
     def tick(self) -> FloatArray:

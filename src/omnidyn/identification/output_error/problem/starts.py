@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.clocks import time_of_row, usual_step
+from omnidyn.clocks import time_of_row
 from omnidyn.compiled.kernel import kernel, maker
+from omnidyn.identification.output_error.problem.observation.observations import OBSERVATIONS
 from omnidyn.identification.output_error.problem.primitives import PrimitiveMap
-from omnidyn.logs.segments import filled
-from omnidyn.model.frames import world_to_body
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import twist_from_wheel_speed
+from omnidyn.sensors import STARTS
 from omnidyn.statistics import difference_noise
 
 if TYPE_CHECKING:
@@ -32,7 +31,6 @@ WINDOW = 0.15  # [s], and at least so many rows:
 LEAST_ROWS, EDGE = 6, 3  # of a window; averaged at each of its ends
 MOTION_ERRORS = 4.0  # standard errors of the noise that a speed must be away from 0
 LEAST_WINDOWS = 8
-SLOPE = 0.05  # [s] over which an angle or a position is differentiated
 MOST_ROWS = 200_000  # rows of a piece that are looked at
 SAMPLE = 1500  # rows for a median
 
@@ -53,52 +51,10 @@ def measured_twist(record: Record, robot: Robot) -> FloatArray | None:
 
 
 def measured_twists(record: Record, robot: Robot) -> Iterator[FloatArray]:
-    """The twist of a record as each of its channels tells it, a measured one first. Each (rows, 3)."""
-    names, wheels = [name for name, _ in record.columns], robot.wheels
-
-    def place(name: str, count: int) -> range:
-        return range(names.index(name), names.index(name) + count)
-
-    if "twist" in names:
-        yield _together(record, place("twist", 3))
-    if "wheel_speed" in names:
-        yield twist_from_wheel_speed(wheels, _together(record, place("wheel_speed", wheels.count)))
-    if "wheel_angle" in names:
-        yield twist_from_wheel_speed(wheels, _rates(record, place("wheel_angle", wheels.count)))
-    if "position" in names and np.isfinite(heading := record.outputs[:, names.index("heading")]).any():
-        first = names.index("position")
-        rates = _rates(record, [first, first + 1, names.index("heading")])
-        yield np.einsum("kij,kj->ki", world_to_body(heading), rates)
-
-
-def _together(record: Record, columns: Sequence[int]) -> FloatArray:
-    """Outputs by column; with clocks of their own in the rows of the first, the others on the line. (rows, columns)."""
-    column_slice = slice(columns.start, columns.stop) if isinstance(columns, range) else columns
-    values = record.outputs[:, column_slice]
-    if not record.staggered:
-        return values
-    return np.where(
-        np.isfinite(values[:, :1]), np.stack([filled(record.t, column) for column in values.T], axis=1), np.nan
-    )
-
-
-def _rates(record: Record, columns: Sequence[int]) -> FloatArray:
-    """Slope of columns over a few rows, NaN outside of the pieces. Shape (rows, columns)."""
-    values, t = _together(record, columns), record.t
-    rates = np.full(values.shape, np.nan)
-    for first, last in record.pieces:
-        rows = np.arange(first, last + 1)
-        rows = rows[np.isfinite(values[rows, 0])] if record.staggered else rows
-        if len(rows) < 2:
-            continue
-        half_width = max(1, round(0.5 * SLOPE / usual_step(t[rows[: SAMPLE + 1]])))
-        row_numbers = np.arange(len(rows))
-        low, high = (
-            rows[np.maximum(row_numbers - half_width, 0)],
-            rows[np.minimum(row_numbers + half_width, len(rows) - 1)],
-        )
-        rates[rows] = (values[high] - values[low]) / (t[high] - t[low])[:, None]
-    return rates
+    """The twist of a record as each of its outputs tells it, a measured one first. Each (rows, 3)."""
+    names = {name for name, _ in record.columns}
+    twists = (OBSERVATIONS[name].twist(record, robot) for name in STARTS if name in names)
+    return (twist for twist in twists if twist is not None)
 
 
 def integral_start(mapping: PrimitiveMap, values: FloatArray, records: Sequence[Record]) -> FloatArray:

@@ -11,7 +11,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import side_by_side
 from omnidyn.identification.output_error.engines.engine import FitEngine
 from omnidyn.identification.output_error.engines.kinds import kind_with, rolling_engine
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, TRAVELS
+from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.problem.primitives import PrimitiveMap
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem, per_column
@@ -20,6 +20,7 @@ from omnidyn.identification.output_error.problem.starts import friction_values, 
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import NEAR_PRECISION, Solution, Solver, State
 from omnidyn.model.keys import FRICTION, find_key
+from omnidyn.sensors import TRAVEL
 
 CURRENTS, MOTOR = f"{LATENCY}.current", "motor"
 MANY_ROWS = 100_000  # rows to which a long log is first fitted
@@ -156,7 +157,7 @@ def _differences(piece: Piece, parts: Parts) -> Parts:
     """Parts of a piece, of what adds up the differences between rows."""
     residual, slopes, indices = parts[0].copy(), parts[1].copy(), parts[2]
     for c, (name, _) in enumerate(piece.record.columns):
-        if name in TRAVELS:
+        if name in TRAVEL:
             measured_rows = np.flatnonzero(np.isfinite(residual[c]))
             residual_steps, slope_steps = (np.diff(values[c][measured_rows], axis=0) for values in (residual, slopes))
             residual[c] = np.nan
@@ -213,7 +214,7 @@ def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
     costs = side_by_side(lambda point: solver.state(point).objective, points)
     best = _levels_first(short, points[int(np.argmin(costs))], nu, progress)
     start_points = [best]
-    if any(name in TRAVELS for name, _ in short.columns):
+    if short.travels.any():
         start_points.append(_by_rates(short, best, nu, progress))
     parts = {p.part for p in problem.parameters}
     if LATENCY in parts and (MOTOR in parts or problem.where(CURRENTS) >= 0):

@@ -17,7 +17,6 @@ from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.methods import FREE, REST
 from omnidyn.identification.output_error.engines.kinds import kind_with
 from omnidyn.identification.output_error.engines.speed_loop import SLOW_LOOP
-from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.parameters import LEAST_LATENCY, MOST_LATENCY, Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
@@ -27,6 +26,7 @@ from omnidyn.identification.output_error.solve.solver import Normal, Solution, S
 from omnidyn.model.keys import FRICTION, Key, friction_keys, gain_keys
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import GIVEN, Robot
+from omnidyn.sensors import TRAVEL
 from omnidyn.statement import WARNING, Statement
 
 FINE_TOLERANCE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
@@ -133,7 +133,7 @@ def _begins_at_rest(twists: Sequence[FloatArray], first: int, last: int) -> bool
 
 def _piece(record: Record, first: int, last: int) -> Piece:
     columns = record.columns
-    travels = np.array([name in TRAVELS for name, _ in columns])
+    travels = np.array([name in TRAVEL for name, _ in columns])
     offset = np.where(travels, record.outputs[first], 0.0)
     return Piece(
         record,

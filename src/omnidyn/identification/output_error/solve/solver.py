@@ -16,7 +16,6 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.engine import FitEngine, P, Weighting
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
-from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import FitProblem, PieceSums, Point, per_column
 from omnidyn.identification.output_error.solve.curvature import Bend
 from omnidyn.identification.output_error.solve.latency_edges import Edges
@@ -112,7 +111,7 @@ class Solver(Generic[P]):
     ):
         self.problem, self.engine, self.nu, self.close, self.counted = problem, engine, nu, precision, counts_ticks
         is_exact = precision <= END_PRECISION  # or a speed loop, which may creep for long, and yet find its way
-        adds_up = any(name in TRAVELS for name, _ in problem.columns)  # what speeds are off by scatters F
+        adds_up = problem.travels.any()  # what speeds are off by scatters F
         self._scatter = 0.0 if is_exact or not adds_up else SCATTER
         self.creep = 0.0 if is_exact else max(CREEP * precision, 2.0 * self._scatter)
         self._kink = max(KINK_PRECISION, precision, 2.0 * self._scatter)  # F would change by less than it scatters

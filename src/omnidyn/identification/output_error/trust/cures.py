@@ -24,6 +24,7 @@ from omnidyn.model.keys import CENTRE, EMF, ROTOR, TORQUE, WHEEL, Key, find_key
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
+from omnidyn.sensors import OF_WHEELS
 from omnidyn.simulation.simulate import simulate
 from omnidyn.statement import NOTE, Statement
 
@@ -50,7 +51,7 @@ MEASURABLE_KEYS = (
 )
 CHANNELS = {  # that would show it -> outputs that show the same
     "current": ("current",),
-    "wheel_speed": ("wheel_speed", "wheel_angle"),
+    "wheel_speed": OF_WHEELS,
     "twist": ("twist", "position"),
 }
 
@@ -207,8 +208,7 @@ def _channels(
     speed = wheel_speed(robot.wheels, run.twist)
     return {
         "twist": run.twist,
-        "wheel_speed": speed,
-        "wheel_angle": speed,
+        **dict.fromkeys(OF_WHEELS, speed),
         "current": settled_currents(robot, run.twist[:-1], at_the_motors),
         "position": run.pose[:, :YAW],
         "heading": run.pose[:, YAW:],

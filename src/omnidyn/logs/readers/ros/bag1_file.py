@@ -22,8 +22,8 @@ _LENGTH, _STAMP, _PLACE = struct.Struct("<I"), struct.Struct("<II"), struct.Stru
 class Bag1File:
     """One ROS 1 bag. `damage` says why it could not be read to its end, once all messages are taken."""
 
-    def __init__(self, stream: BinaryIO, size: int, unpacker: Unpacker, told: Callable[[int], None]):
-        self.stream, self.size, self.unpacker, self.told = stream, size, unpacker, told
+    def __init__(self, stream: BinaryIO, size: int, unpacker: Unpacker, read_to: Callable[[int], None]):
+        self.stream, self.size, self.unpacker, self.read_to = stream, size, unpacker, read_to
         self.connections: dict[int, Connection] = {}
         self.damage, self.odd = "", LeftOut()
         self.promised: tuple[int, int] | None = None  # where the index begins, and how many records it has
@@ -43,7 +43,7 @@ class Bag1File:
                 if not complete:
                     raise DamagedError("it ends in the middle of a record")
                 self._count(fields, at)
-                self.told(self.stream.tell())
+                self.read_to(self.stream.tell())
             if self.promised is not None and (not self.promised[0] or self.indexed < self.promised[1]):
                 raise DamagedError("it ends without its index")
         except DamagedError as error:

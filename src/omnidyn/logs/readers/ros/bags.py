@@ -39,7 +39,7 @@ def read_files(paths: Sequence[Path], source: str, options: ReadOptions) -> Reco
     total, bytes_before = sum(os.stat(path).st_size for path in paths if path.exists()), 0
     for path in paths:
 
-        def told(at: int, before: int = bytes_before) -> None:
+        def read_to(at: int, before: int = bytes_before) -> None:
             options.progress(Report("reading", before + at, total))
 
         with open_regular(path) as stream:
@@ -48,7 +48,7 @@ def read_files(paths: Sequence[Path], source: str, options: ReadOptions) -> Reco
                 digest.update(block)
             stream.seek(0)
             bytes_before += size
-            with _opened(stream, path, limit, told) as file:
+            with _opened(stream, path, limit, read_to) as file:
                 bag.add(file.messages(bag.wants))
             damage += [file.damage] if file.damage else []
             grown += file.odd.notes

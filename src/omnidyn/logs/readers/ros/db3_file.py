@@ -19,8 +19,8 @@ class Db3File:
     """One .db3 file. What SQLite cannot read is refused, as nobody knows which pages are missing; `damage` says whether
     messages stand beside it, where SQLite puts them until they are folded in."""
 
-    def __init__(self, path: Path, size: int, unpacker: Unpacker, told: Callable[[int], None]):
-        self.path, self.size, self.unpacker, self.told = path, size, unpacker, told
+    def __init__(self, path: Path, size: int, unpacker: Unpacker, read_to: Callable[[int], None]):
+        self.path, self.size, self.unpacker, self.read_to = path, size, unpacker, read_to
         self.damage, self.odd = "", LeftOut()
 
     def messages(self, wants: Callable[[Connection], bool]) -> Iterator[Message]:
@@ -69,7 +69,7 @@ class Db3File:
                 connections[number], stamp, self.unpacker.message(content) if content[:1] == b"\x28" else content
             )
             if count % 20_000 == 0:
-                self.told(min(self.size, count * 200))
+                self.read_to(min(self.size, count * 200))
 
     def _definitions(self, db: sqlite3.Connection) -> dict[str, str]:
         query = "select topic_type, encoded_message_definition from message_definitions where encoding = 'ros2msg'"

@@ -24,8 +24,8 @@ _HEAD, _MESSAGE, _CHUNK = struct.Struct("<BQ"), struct.Struct("<HIQQ"), struct.S
 class McapFile:
     """One MCAP file. `damage` says why it could not be read to its end, once all messages are taken."""
 
-    def __init__(self, stream: BinaryIO, size: int, unpacker: Unpacker, told: Callable[[int], None]):
-        self.stream, self.size, self.unpacker, self.told = stream, size, unpacker, told
+    def __init__(self, stream: BinaryIO, size: int, unpacker: Unpacker, read_to: Callable[[int], None]):
+        self.stream, self.size, self.unpacker, self.read_to = stream, size, unpacker, read_to
         self.schemas: dict[int, tuple[str, str, str]] = {}
         self.channels: dict[int, Connection] = {}
         self.damage, self.odd = "", LeftOut()
@@ -55,7 +55,7 @@ class McapFile:
                 raise DamagedError("it ends in the middle of a record")
             if opcode == CHUNK:
                 yield from self._chunk(self.stream.read(length))
-                self.told(self.stream.tell())
+                self.read_to(self.stream.tell())
             elif opcode in (SCHEMA, CHANNEL, MESSAGE):
                 message = self._record(opcode, self.stream.read(length))
                 if message is not None:
