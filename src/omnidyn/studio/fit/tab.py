@@ -8,11 +8,14 @@ from typing import Any
 
 from nicegui import ui
 
+from omnidyn.document import in_clauses
+from omnidyn.studio.calls import LogFile
 from omnidyn.studio.elements import table, verdict
-from omnidyn.studio.fit.state import FITTED, HELD_OUT, LEFT_OUT, Fitting
+from omnidyn.studio.fit.state import MAX_NOTE, Fitting
 from omnidyn.studio.page import Page
-from omnidyn.studio.parts import FIT, FREE, LOGS, ROBOT
-from omnidyn.studio.series import SERIES
+from omnidyn.studio.parts import FIT, FITTED, FREE, HELD_OUT, LEFT_OUT, LOGS, ROBOT
+from omnidyn.studio.session import ROBOT_SUFFIX
+from omnidyn.studio.task import Task
 
 WHY = {
     "no_log": "Add a log first: tab Log.",
@@ -34,10 +37,12 @@ class FitTab:
         self.page.empty("Fit")
         self.page.part(self.page.robot_choice, ROBOT)
         self.page.part(self._uses, LOGS)
+        self.page.part(self._remedies, LOGS)
         self.page.part(self._free, FREE, ROBOT)
         self.page.part(self._start, FIT, LOGS)
         self.page.progress(FIT, lambda: self.fitting.last, "fit")
         self.page.part(self._result, FIT)
+        self.page.part(self._history, FIT, ROBOT)
 
     def _uses(self) -> None:
         """What each log is used for: fitted, predicted only, or not at all."""
@@ -59,6 +64,22 @@ class FitTab:
     def _use(self, key: str) -> Callable[[Any], None]:
         """What takes the use of a log."""
         return lambda event: self.fitting.use(key, event.value)
+
+    def _remedies(self) -> None:
+        """What is wrong with a log and can be mended by reading it another way, each with a button."""
+        for log in self.fitting.logs:
+            for finding in log.result["findings"] if log.result else ():
+                if finding["severity"] == "error" and finding["reading"]:
+                    with ui.row().classes("line verdict warning"):
+                        ui.label("!").classes("mark")
+                        ui.label(f"{log.label}: {finding['text']}").classes("text")
+                        ui.button(
+                            f"Mend {log.label}: {_mend(finding)}", on_click=self._read_anew(log, finding["reading"])
+                        ).props(f"unelevated no-caps aria-label='mend {log.label}'").classes("mend")
+
+    def _read_anew(self, log: LogFile, reading: dict[str, Any]) -> Callable[[], None]:
+        """What reads a log as its remedy says."""
+        return lambda: self.session.start(self.session.remedy(log, reading))
 
     def _start(self) -> None:
         """The button, or why it waits."""
@@ -113,14 +134,75 @@ class FitTab:
                 ).props("outline dense no-caps")
         for words in result["advice"]:
             ui.label(f"→ {words}").classes("text")
-        if SERIES in fit.series:
-            ui.label("Free run: the model gets the inputs only").classes("title")
-            self.page.plot(fit.series[SERIES], [], "free-run.png")
+        if result.get("runs"):
+            self._runs(fit, result)
         with self.page.box(f"Warnings and notes ({len(result['warnings'])})"):
             for warning in result["warnings"]:
                 ui.label(f"{warning['severity']}: {warning['text']}").classes("text")
         self.page.calls(fit.command, fit.python)
 
+    def _runs(self, fit: Task, result: dict[str, Any]) -> None:
+        """The error of each log, and its free run or what that leaves."""
+        ui.label("Free run over each log: the model gets the inputs only").classes("title")
+        table(result["logs"], "fit-logs")
+        runs, at = result["runs"], {"log": next(iter(result["runs"])), "kind": 0}
+
+        def look(**more: Any) -> None:
+            at.update(more)
+            picture.props["data-series"] = fit.series[runs[at["log"]][at["kind"]]]
+
+        with ui.row().classes("line"):
+            if len(runs) > 1:
+                ui.select(list(runs), value=at["log"], label="Log", on_change=lambda e: look(log=e.value)).classes(
+                    "wide run-log"
+                )
+            ui.toggle({0: "free run", 1: "residuals"}, value=0, on_change=lambda e: look(kind=e.value)).props(
+                "no-caps dense unelevated id=run-kind"
+            )
+        picture = self.page.plot(fit.series[runs[at["log"]][0]], [], "free-run.png")
+
+    def _history(self) -> None:
+        """All fits of the session, to be looked at again, named, noted, removed."""
+        fitting = self.fitting
+        if not fitting.history:
+            return
+        with self.page.box(f"History ({len(fitting.history)})"):
+            with ui.element("div").classes("robots"):
+                for name, fit in reversed(fitting.history.items()):
+                    self._fit_entry(name, fit)
+            with ui.row().classes("line"):
+                ui.link("Save the work as a Python script", "/script").props("download")
+                ui.label("It makes the same numbers from the same logs.").classes("text quiet")
+
+    def _fit_entry(self, name: str, fit: Task) -> None:
+        """A fit of the history."""
+        fitting, stem = self.fitting, name.removesuffix(ROBOT_SUFFIX)
+        trouble = ui.label().classes("text error-text")
+        with ui.row().classes("line entry"):
+            named = ui.input(value=stem).props(f"dense aria-label='name of {stem}'").classes("use")
+
+            def rename() -> None:
+                if named.value and named.value != stem:
+                    trouble.text = fitting.rename(name, str(named.value))
+
+            named.on("change", rename)
+            note = ui.input(placeholder="note", value=fitting.notes.get(name, "")).classes("wide")
+            note.props(f"dense maxlength={MAX_NOTE} aria-label='note to {stem}'")
+            note.on("change", lambda: fitting.note(name, str(note.value or "")))
+            shown = fit is fitting.last
+            button = ui.button("Shown" if shown else "Show", on_click=lambda: fitting.show(name))
+            button.props(f"flat dense no-caps aria-label='show {stem}'").set_enabled(not shown)
+            ui.button("Remove", on_click=lambda: fitting.remove(name)).props(
+                f"flat dense no-caps aria-label='remove {stem}'"
+            )
+        if fit.result is not None:
+            ui.label(in_clauses(fit.result["verdict"])[0]).classes("text quiet")
+
     def _refit(self, key: str) -> Callable[[], None]:
         """What fits again, with a number that the model has not yet."""
         return lambda: self.session.start(self.fitting.run(key))
+
+
+def _mend(finding: dict[str, Any]) -> str:
+    """What the button of a remedy does, in words."""
+    return f"{finding['subject']} with the other sign" if finding["code"] == "inverted" else "apply the remedy"

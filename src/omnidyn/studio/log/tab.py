@@ -24,6 +24,7 @@ class LogTab:
         """Lay it out."""
         with ui.row().classes("line"):
             ui.element("omni-drop")
+            self.page.part(lambda: ui.label(self.session.room).classes("text quiet").props("id=room"), LOGS, ROBOT)
             ui.button("Use the example log", on_click=self.page.busy(self.session.example)).props(
                 "outline no-caps id=example"
             )

@@ -10,6 +10,7 @@ from nicegui import ui
 from omnidyn.model.wheels import ROBOT_RADII, WHEEL_RADII
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import ROBOT
+from omnidyn.studio.session import ROBOT_SUFFIX
 
 
 def _range(limits: tuple[float, float]) -> str:
@@ -64,7 +65,7 @@ class RobotTab:
         """The text of a file, to be changed and kept under this name or another one."""
         text = ui.textarea(value=self.session.robot_text(name), label=f"File of {name}").classes("file")
         text.props("outlined autogrow input-class=code")
-        saved = ui.input("keep as", value=name if self.session.is_file(name) else f"my-{name}.toml").classes("wide")
+        saved = ui.input("keep as", value=name if self.session.is_editable(name) else f"my-{name.removesuffix(ROBOT_SUFFIX)}.toml").classes("wide")
         trouble = ui.label().classes("text error-text")
 
         async def keep() -> str:
@@ -75,7 +76,7 @@ class RobotTab:
 
         with ui.row().classes("line"):
             ui.button("Keep", on_click=self.page.busy(keep, trouble)).props("outline no-caps id=keep-robot")
-            ui.label("Another name renames a file of yours; a preset stays as it is.").classes("text quiet")
+            ui.label("Another name renames a file of yours; a preset and a fit stay as they are.").classes("text quiet")
 
     def _robot_form(self) -> None:
         """What `init` asks for, within what robots have, and the robot as it is described."""
