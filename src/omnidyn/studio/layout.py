@@ -121,7 +121,7 @@ def show(studio: Studio, tab: str = "") -> None:
                 ui.button("Undo", on_click=session.undo).props("outline dense no-caps id=undo")
 
     page.part(line, LOGS, PROGRESS, ROBOT, FIT)
-    page.part(undo, LOGS, ROBOT)
+    page.part(undo, LOGS, ROBOT, of=lambda: session.removed)
     first = next((name for name in tabs if name.lower() == tab.lower()), next(iter(tabs)))
     with ui.tab_panels(page.tabs, value=first, animated=False).classes("panels"):
         for name, part in tabs.items():

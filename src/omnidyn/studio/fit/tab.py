@@ -35,14 +35,14 @@ class FitTab:
     def build(self) -> None:
         """Lay it out."""
         self.page.empty("Fit")
-        self.page.part(self.page.robot_choice, ROBOT)
-        self.page.part(self._uses, LOGS)
-        self.page.part(self._remedies, LOGS)
+        self.page.part(self.page.robot_choice, ROBOT, of=self.page.robots)
+        self.page.part(self._uses, LOGS, of=self._usable)
+        self.page.part(self._remedies, LOGS, FIT, of=self._wrong)
         self.page.part(self._free, FREE, ROBOT)
-        self.page.part(self._start, FIT, LOGS)
+        self.page.part(self._start, FIT, LOGS, of=self._ready)
         self.page.progress(FIT, lambda: self.fitting.last, "fit")
         self.page.part(self._result, FIT)
-        self.page.part(self._history, FIT, ROBOT)
+        self.page.part(self._history, FIT, ROBOT, of=self._kept)
 
     def _uses(self) -> None:
         """What each log is used for: fitted, predicted only, or not at all."""
@@ -57,9 +57,16 @@ class FitTab:
                     )
                     use.props(f"no-caps dense unelevated aria-label='use of {log.label}'")
                     self.page.mirror(use, FIT, partial(self.fitting.use_of, key), key)
-                    if log.error or (log.result and log.result["has_errors"]):
+                    if not self._usable()[key][1]:
                         ui.label("not usable as it is: leave it out, or mend it on the tab Log").classes("error-text")
         ui.label("What is held out is predicted, not fitted: that shows what the model is worth.").classes("quiet")
+
+    def _usable(self) -> dict[str, tuple[str, bool]]:
+        """Key of each log -> its label, and whether it can be used as it is."""
+        logs = self.session.logs.items()
+        return {
+            key: (log.label, not log.error and not (log.result and log.result["has_errors"])) for key, log in logs
+        }
 
     def _use(self, key: str) -> Callable[[Any], None]:
         """What takes the use of a log."""
@@ -67,34 +74,41 @@ class FitTab:
 
     def _remedies(self) -> None:
         """What is wrong with a log and can be mended by reading it another way, each with a button."""
-        for log in self.fitting.logs:
-            for finding in log.result["findings"] if log.result else ():
-                if finding["severity"] == "error" and finding["reading"]:
-                    with ui.row().classes("line verdict warning"):
-                        ui.label("!").classes("mark")
-                        ui.label(f"{log.label}: {finding['text']}").classes("text")
-                        ui.button(
-                            f"Mend {log.label}: {_mend(finding)}", on_click=self._read_anew(log, finding["reading"])
-                        ).props(f"unelevated no-caps aria-label='mend {log.label}'").classes("mend")
+        for log, finding in self._wrong():
+            with ui.row().classes("line verdict warning"):
+                ui.label("!").classes("mark")
+                ui.label(f"{log.label}: {finding['text']}").classes("text")
+                mend = ui.button(f"Mend {log.label}: {_mend(finding)}")
+                mend.props(f"outline no-caps aria-label='mend {log.label}'")
+                mend.on_click(self._read_anew(log, finding["reading"]))
+
+    def _wrong(self) -> list[tuple[LogFile, dict[str, Any]]]:
+        """Errors of the logs that are used, where another reading mends them."""
+        found = [(log, finding) for log in self.fitting.logs for finding in (log.result or {}).get("findings", ())]
+        return [(log, finding) for log, finding in found if finding["severity"] == "error" and finding["reading"]]
 
     def _read_anew(self, log: LogFile, reading: dict[str, Any]) -> Callable[[], None]:
         """What reads a log as its remedy says."""
         return lambda: self.session.start(self.session.remedy(log, reading))
 
+    def _ready(self) -> tuple[tuple[str, str], bool, str]:
+        """Why there is no fit now, whether one goes on, and what would be fitted."""
+        names = ", ".join(log.label for log in self.fitting.logs)
+        return self.fitting.why_not(), self.fitting.last.running, f"{names}, from {self.session.robot}"
+
     def _start(self) -> None:
         """The button, or why it waits."""
         session = self.session
-        code, words = self.fitting.why_not()
+        (code, words), running, fitted = self._ready()
         with ui.row().classes("line"):
             button = ui.button("Fit", on_click=lambda: session.start(self.fitting.run())).props(
                 "unelevated no-caps id=fit"
             )
-            button.set_enabled(not code and not self.fitting.last.running)
+            button.set_enabled(not code and not running)
             if code:
                 ui.label(words if code in ("unfit", "unread") else WHY[code]).classes("text quiet").props("id=why")
-            elif not self.fitting.last.running:
-                names = ", ".join(log.label for log in self.fitting.logs)
-                ui.label(f"{names}, from {session.robot}").classes("text quiet")
+            elif not running:
+                ui.label(fitted).classes("text quiet")
 
     def _free(self) -> None:
         """What is fitted; at first what `identify` fits of itself."""
@@ -160,6 +174,10 @@ class FitTab:
                 "no-caps dense unelevated id=run-kind"
             )
         picture = self.page.plot(fit.series[runs[at["log"]][0]], [], "free-run.png")
+
+    def _kept(self) -> tuple[list[str], str]:
+        """The fits of the history, and the one that is shown."""
+        return list(self.fitting.history), self.fitting.name_of(self.fitting.last)
 
     def _history(self) -> None:
         """All fits of the session, to be looked at again, named, noted, removed."""

@@ -26,7 +26,7 @@ class RobotTab:
 
     def build(self) -> None:
         """Lay it out."""
-        self.page.part(self.page.robot_choice, ROBOT)
+        self.page.part(self.page.robot_choice, ROBOT, of=self.page.robots)
         self.page.next_step("Robot")
         with self.page.box("Describe another robot"):
             self._robot_form()
