@@ -11,7 +11,7 @@ from nicegui import ui
 from omnidyn.studio.elements import verdict
 from omnidyn.studio.parts import FIT, LOGS, ROBOT
 from omnidyn.studio.session import Session
-from omnidyn.studio.steps import DONE, StepState
+from omnidyn.studio.steps import DONE, READY, WAITING, StepState
 from omnidyn.studio.task import Task, progress_of
 
 STEPS = (  # what a newcomer does: title, and words
@@ -77,7 +77,7 @@ class Page:
 
         def show() -> None:
             line = self.line()
-            if all(step.state == DONE for step in line[: 1 if name == "Log" else 2]):
+            if all(step.state not in (READY, WAITING) for step in line[: 1 if name == "Log" else 2]):
                 return
             with ui.element("div").classes("empty"):
                 ui.image("/static/steps.svg").props("alt='A robot seen from above, its log, and the fitted curve'")

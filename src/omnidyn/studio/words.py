@@ -13,16 +13,29 @@ PAGE_NAMES = {  # option of a call -> where a page has it
     "free": "Free (tab Fit)",
     "hold_out": "hold out (tab Fit)",
     "invert": "other sign (tab Log, Columns and units)",
-    "mapping": "Columns and units (tab Log)",
     "unit": "in unit (tab Log, Columns and units)",
 }
-AS_WRITTEN = ("columns", "reading", "unused", "values")  # of a result: no words of the library
+AS_WRITTEN = ("columns", "numbers", "reading", "unused", "values")  # of a result: no words of the library
+AXES = ("vx", "vy", "omega")
+CHANNEL_NAMES = {"twist": "speed over the ground", "wheel_speed": "wheel speeds", "wheel_angle": "wheel angles"}
+_LATENCY, _TWIST = re.compile(r"\blatency\.([a-z_]+)"), re.compile(r"\btwist\[([0-2])\]")
 _OPTION = re.compile(r"`([a-z]+(?:_[a-z]+)*)`")
 
 
 def in_page_names(text: str) -> str:
     """A text with each option in backticks as a page has it, else as the command line has it."""
-    return _OPTION.sub(_of_page, text)
+    return _LATENCY.sub(_of_channel, _TWIST.sub(lambda match: AXES[int(match[1])], _OPTION.sub(_of_page, text)))
+
+
+def number_in_words(name: str) -> str:
+    """What a page calls a number of a log, such as "latency.twist"; "" for what has a name already."""
+    if match := _LATENCY.fullmatch(name):
+        return _of_channel(match)
+    return name.replace("_", " ") if name.isidentifier() else ""
+
+
+def _of_channel(match: re.Match[str]) -> str:
+    return f"latency of the {CHANNEL_NAMES.get(match[1], match[1].replace('_', ' '))}"
 
 
 def _of_page(match: re.Match[str]) -> str:

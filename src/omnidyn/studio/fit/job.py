@@ -25,6 +25,7 @@ from omnidyn.progress import Progress, Report
 from omnidyn.statement import ERROR, SEVERITIES, Statement
 from omnidyn.studio.job import Tell, read, robot_of, timed, write_free_runs
 from omnidyn.studio.parts import FITTED, HELD_OUT
+from omnidyn.studio.words import number_in_words
 
 IDLE = 19  # of a process that waits for all others
 LOADED, COMPILED = 2, 8  # of the first runs: a simulation and a fit; those of the exact engine, seconds each
@@ -101,7 +102,7 @@ def _numbers(estimate: Estimate) -> Table:
     """Every number with its interval."""
     if isinstance(estimate, OutputErrorEstimate):
         table = number_table(estimate)
-        return replace(table, rows=[(row[0], *row[1:]) for row in table.rows])
+        return replace(table, rows=[(row[0] or number_in_words(row[1]), *row[1:]) for row in table.rows])
     rows = [
         (
             in_words(name),
