@@ -132,6 +132,8 @@ class Session:
             with path.open("xb") as file:
                 async for block in body:
                     size += len(block)
+                    if self._bytes + size > MAX_BYTES:
+                        self._forget_removed()
                     if size > MAX_FILE_BYTES or self._bytes + size > MAX_BYTES:
                         most = f"{MAX_FILE_BYTES // 2**30} GiB each and {MAX_BYTES // 2**30} GiB in all are the most"
                         raise RefusedError(f"too large: {most}. Name it on the command line instead.")
@@ -199,10 +201,15 @@ class Session:
         self._remove(Removed(log.label, restore, discard))
 
     def _remove(self, removed: Removed) -> None:
-        if self.removed is not None:
-            self.removed.discard()
+        self._forget_removed()
         self.removed = removed
         self.changed(LOGS, ROBOT, FIT)
+
+    def _forget_removed(self) -> None:
+        """Delete the file of what was removed last: it cannot come back any more."""
+        if self.removed is not None:
+            self.removed.discard()
+            self.removed = None
 
     def undo(self) -> None:
         """Bring back what was removed last."""
