@@ -1,4 +1,4 @@
-"""The history of fits, what is removed and brought back, what a user may bring, and that no path of the server shows."""
+"""The history of fits, removals and undo, what a user may bring, and that no path of the server shows."""
 
 import asyncio
 from pathlib import Path

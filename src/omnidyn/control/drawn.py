@@ -45,7 +45,9 @@ class Smooth(Path):
         time = np.asarray(t, dtype=float)
         velocity = np.gradient(self.pose, self.t, axis=0)
         parts = (self.pose, velocity, np.gradient(velocity, self.t, axis=0))
-        return Reference(*(np.stack([np.interp(time, self.t, part[:, k]) for k in range(3)], axis=-1) for part in parts))
+        return Reference(
+            *(np.stack([np.interp(time, self.t, part[:, k]) for k in range(3)], axis=-1) for part in parts)
+        )
 
 
 def smoothed(path: Polyline, width: float, *, closed: bool = False) -> Polyline:

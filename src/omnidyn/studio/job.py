@@ -92,9 +92,7 @@ def read(log: Mapping[str, Any], robot: Robot | None) -> Log:
     return replace(recorded_log(log["path"], robot, options_of(log)), source=log["name"])
 
 
-def write_free_runs(
-    comparison: Comparison, log: int, folder: Path, *, residuals: bool = False, **more: Any
-) -> bool:
+def write_free_runs(comparison: Comparison, log: int, folder: Path, *, residuals: bool = False, **more: Any) -> bool:
     """A panel for each component of a log: measured, and the free run of each robot; whether there is one.
 
     residuals: measured minus each free run instead. more: what a page needs beside them.

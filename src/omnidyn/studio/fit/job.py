@@ -45,8 +45,8 @@ CHOICES = (  # what a page offers beside what is free by default; any key can be
 def fit(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
     """What `omnidyn identify` says of logs: verdict, numbers, advice; writes robot, report, table and series.
 
-    request: "robot", "logs" (path, name, map, unsigned each), "hold_out" (names), "free" (keys, or none for the default),
-    "folder" of the results.
+    request: "robot", "logs" (path, name, map, unsigned each), "hold_out" (names), "free" (keys, or none for the
+    default), "folder" of the results.
     """
     with timed(tell) as listen:
         return _fitted(request, listen)

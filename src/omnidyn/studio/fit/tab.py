@@ -64,9 +64,7 @@ class FitTab:
     def _usable(self) -> dict[str, tuple[str, bool]]:
         """Key of each log -> its label, and whether it can be used as it is."""
         logs = self.session.logs.items()
-        return {
-            key: (log.label, not log.error and not (log.result and log.result["has_errors"])) for key, log in logs
-        }
+        return {key: (log.label, not log.error and not (log.result and log.result["has_errors"])) for key, log in logs}
 
     def _use(self, key: str) -> Callable[[Any], None]:
         """What takes the use of a log."""

@@ -65,7 +65,9 @@ class RobotTab:
         """The text of a file, to be changed and kept under this name or another one."""
         text = ui.textarea(value=self.session.robot_text(name), label=f"File of {name}").classes("file")
         text.props("outlined autogrow input-class=code")
-        saved = ui.input("keep as", value=name if self.session.is_editable(name) else f"my-{name.removesuffix(ROBOT_SUFFIX)}.toml").classes("wide")
+        saved = ui.input(
+            "keep as", value=name if self.session.is_editable(name) else f"my-{name.removesuffix(ROBOT_SUFFIX)}.toml"
+        ).classes("wide")
         trouble = ui.label().classes("text error-text")
 
         async def keep() -> str:

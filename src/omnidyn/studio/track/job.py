@@ -31,7 +31,8 @@ def track(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, An
     """What `omnidyn track` says of controllers on a path; writes their runs, the animation and series.
 
     request: "robot", "plant" ("" for the same), "path" (as `track` takes it), "file" (the name of one, where it is
-    one), "points", "speed", "closed" and "smoothing" ([s], None for what the robot needs) of one drawn by hand, "controllers", "sensors", "folder" of the results.
+    one), "points", "speed", "closed" and "smoothing" ([s], None for what the robot needs) of one drawn by hand,
+    "controllers", "sensors", "folder" of the results.
     """
     with timed(tell) as listen:
         return _tracked(request, listen)
