@@ -12,10 +12,8 @@ import inspect
 import itertools
 import re
 import shutil
-import sys
 import tempfile
 from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +23,7 @@ from omnidyn.model.presets import robot_path
 from omnidyn.progress import Report
 from omnidyn.studio.calls import LogFile
 from omnidyn.studio.parts import COMPARE, FIT, LOGS, PROGRESS, ROBOT, TRACK
+from omnidyn.studio.removed import Removed
 from omnidyn.studio.series import META, Series
 from omnidyn.studio.words import each_text, in_page_names
 from omnidyn.studio.worker import CancelledError, EndedError, JobError, Worker
@@ -36,15 +35,6 @@ MAX_NAME = 80
 
 class RefusedError(Exception):
     """An upload that is not taken, and why."""
-
-
-@dataclass(frozen=True)
-class Removed:
-    """What was removed last: its name, what brings it back, and what deletes its file."""
-
-    name: str
-    restore: Callable[[], None]
-    discard: Callable[[], None]
 
 
 class Session:
@@ -370,18 +360,6 @@ class Session:
 
         self._remove(Removed(name, restore, lambda: None))
 
-    def rename_robot(self, name: str, other: str) -> str:
-        """Give a robot file another name, which it then has as a file too; an error in words, or ""."""
-        new = f"{safe_name(other.removesuffix(ROBOT_SUFFIX))}{ROBOT_SUFFIX}"
-        if new in self.robots:
-            return str(InputError("there is a robot of this name", got=new, remedy="use another name"))
-        self.robots[new] = str(shutil.copyfile(self.robots.pop(name), self.new_folder() / new))
-        if name in self.made:
-            self.made.add(new)
-        self.robot = new if self.robot == name else self.robot
-        self.changed(ROBOT)
-        return ""
-
     def free_name(self, name: str) -> str:
         """The name, or the next one that no robot has yet."""
         stem, _, suffix = name.rpartition(".")
@@ -395,22 +373,6 @@ class Session:
             for log in self.logs.values():
                 self.start(self.check(log))
             self.changed(ROBOT, FIT)
-
-    async def make_robot(self, name: str, options: list[str]) -> str:
-        """The robot that `omnidyn init` writes for these options; an error in words, or ""."""
-        path = self.new_folder() / f"{safe_name(name)}{ROBOT_SUFFIX}"
-        process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "omnidyn", "init", path.stem, *options, "-o", str(path)),
-            stdin=asyncio.subprocess.DEVNULL,
-            stdout=asyncio.subprocess.DEVNULL,
-            stderr=asyncio.subprocess.PIPE,
-        )
-        _, said = await process.communicate()
-        if process.returncode:
-            words = said.decode("utf-8", "replace").strip().removeprefix("omnidyn: error: ")
-            return self.shown(words) or str(EndedError(process.returncode))
-        self.add_robot(str(path), path.name)
-        return ""
 
 
 def safe_name(name: str) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 from omnidyn.studio import calls
 from omnidyn.studio.calls import LogFile
 from omnidyn.studio.parts import FIT, FITTED, FREE, HELD_OUT, LEFT_OUT, ROBOT
+from omnidyn.studio.robot.rename import rename_robot
 from omnidyn.studio.session import Session
 from omnidyn.studio.task import Task
 from omnidyn.studio.worker import CancelledError, JobError
@@ -186,7 +187,7 @@ class Fitting:
 
     def rename(self, name: str, other: str) -> str:
         """Give a fit another name; an error in words, or ""."""
-        words = self.session.rename_robot(name, other)
+        words = rename_robot(self.session, name, other)
         if not words:
             new = next(reversed(self.session.robots))
             for table in (self.fits, self.notes, self.recipes):

@@ -10,6 +10,7 @@ from nicegui import ui
 from omnidyn.model.wheels import ROBOT_RADII, WHEEL_RADII
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import ROBOT
+from omnidyn.studio.robot.make import make_robot
 from omnidyn.studio.session import ROBOT_SUFFIX
 
 
@@ -112,7 +113,7 @@ class RobotTab:
 
         async def make() -> str:
             options = [f"{flag}={field.value}" for flag, field in inputs.items() if str(field.value or "").strip()]
-            return await self.session.make_robot(name.value or "", options)
+            return await make_robot(self.session, name.value or "", options)
 
         ui.button("Make this robot", on_click=self.page.busy(make, trouble)).props("outline no-caps id=make-robot")
         ui.label("What is left empty is guessed, with a wide spread, and marked as a guess.").classes("text quiet")
