@@ -29,6 +29,10 @@ from omnidyn.studio.words import each_text, in_page_names
 from omnidyn.studio.worker import CancelledError, EndedError, JobError, Worker
 
 MAX_FILES, MAX_FILE_BYTES, MAX_BYTES = 50, 2**30, 4 * 2**30  # of uploads
+TOO_LARGE = (
+    f"too large: {MAX_FILE_BYTES // 2**30} GiB each and {MAX_BYTES // 2**30} GiB in all are the most. "
+    "Name it on the command line instead."
+)
 ROBOT_SUFFIX = ".toml"
 MAX_NAME = 80
 
@@ -125,8 +129,7 @@ class Session:
                     if self._bytes + size > MAX_BYTES:
                         self._forget_removed()
                     if size > MAX_FILE_BYTES or self._bytes + size > MAX_BYTES:
-                        most = f"{MAX_FILE_BYTES // 2**30} GiB each and {MAX_BYTES // 2**30} GiB in all are the most"
-                        raise RefusedError(f"too large: {most}. Name it on the command line instead.")
+                        raise RefusedError(TOO_LARGE)
                     file.write(block)
         except BaseException:
             path.unlink(missing_ok=True)
@@ -154,14 +157,13 @@ class Session:
     @property
     def brought(self) -> int:
         """How many files the user brought."""
-        logs = sum(key not in self.made for key in self.logs)
-        return logs + sum(self.is_file(name) and name not in self.made for name in self.robots) + self.others
+        return len({*self.logs} - self.made) + sum(map(self.is_editable, self.robots)) + self.others
 
     @property
     def room(self) -> str:
         """How many files there may be, in words."""
-        full = " Remove one first." if self.brought >= MAX_FILES else ""
-        return f"{self.brought} of at most {MAX_FILES} files, {MAX_FILE_BYTES // 2**30} GiB each.{full}"
+        count, each = f"{self.brought} of at most {MAX_FILES} files", f"{MAX_FILE_BYTES // 2**30} GiB each"
+        return f"{count}, {each}.{' Remove one first.' * (self.brought >= MAX_FILES)}"
 
     def taker(self, kind: str) -> Callable[[str, str], object]:
         """What takes a file of a kind, by its path and the name that pages show; what is no other kind is a log."""
@@ -197,15 +199,15 @@ class Session:
 
     def _forget_removed(self) -> None:
         """Delete the file of what was removed last: it cannot come back any more."""
-        if self.removed is not None:
-            self.removed.discard()
-            self.removed = None
+        removed, self.removed = self.removed, None
+        if removed is not None:
+            removed.discard()
 
     def undo(self) -> None:
         """Bring back what was removed last."""
-        if self.removed is not None:
-            self.removed.restore()
-            self.removed = None
+        removed, self.removed = self.removed, None
+        if removed is not None:
+            removed.restore()
             self.changed(LOGS, ROBOT, FIT)
 
     async def example(self) -> str:
@@ -217,7 +219,7 @@ class Session:
             return str(error)
         self.robot = self.robot or "axebot"
         self.made.add(self.add_log(str(path), path.name).key)
-        self.changed(ROBOT)
+        self.changed(LOGS, ROBOT)
         return ""
 
     async def check(self, log: LogFile) -> None:
@@ -338,7 +340,7 @@ class Session:
             return str(InputError("there is a robot of this name", got=name, remedy="use another name"))
         path = self.new_folder() / name
         path.write_text(text, "utf-8")
-        before = of if name != of and self.is_editable(of) else ""
+        before = of * (name != of and self.is_editable(of))
         try:
             await self.take_robot(str(path), name)
         except InputError as error:
@@ -351,11 +353,10 @@ class Session:
     def remove_robot(self, name: str) -> None:
         """Take a robot file away; it can be brought back."""
         path, chosen = self.robots.pop(name), self.robot == name
-        self.robot = "" if chosen else self.robot
+        self.robot = self.robot * (not chosen)
 
         def restore() -> None:
-            back = name if name not in self.robots else self.free_name(name)
-            self.robots[back] = path
+            self.robots[back := self.free_name(name)] = path
             self.robot = back if chosen and not self.robot else self.robot
 
         self._remove(Removed(name, restore, lambda: None))
@@ -363,8 +364,8 @@ class Session:
     def free_name(self, name: str) -> str:
         """The name, or the next one that no robot has yet."""
         stem, _, suffix = name.rpartition(".")
-        names = (f"{stem}-{k}.{suffix}" for k in itertools.count(2))
-        return next(free for free in itertools.chain((name,), names) if free not in self.robots)
+        others = (f"{stem}-{k}.{suffix}" for k in itertools.count(2))
+        return next(free for free in itertools.chain((name,), others) if free not in self.robots)
 
     def choose(self, name: str) -> None:
         """Choose a robot; logs are checked with it."""
