@@ -340,13 +340,12 @@ class Session:
             return str(InputError("there is a robot of this name", got=name, remedy="use another name"))
         path = self.new_folder() / name
         path.write_text(text, "utf-8")
-        before = of * (name != of and self.is_editable(of))
         try:
             await self.take_robot(str(path), name)
         except InputError as error:
             return str(error)
-        if before:
-            self.robots.pop(before)
+        if name != of and self.is_editable(of):
+            self.robots.pop(of)
             self.changed(ROBOT)
         return ""
 
