@@ -71,6 +71,7 @@ NAMES = {
     # skins
     "first_minutes": "CSV to report of a robot of `init`, whole commands: nothing compiled, and compiled (3 minutes)",
     "studio": "a drive of ten minutes in a browser, a silent client, many pages, an installation (13 minutes)",
+    "studio_kills": "each worker of the studio killed at random moments: said, and run again (ten minutes)",
     "studio_log": "a log of 3.6 million rows in the studio, in a browser: first word, picture, pans (2 minutes)",
 }
 ANSWERS = "answers"

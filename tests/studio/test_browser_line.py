@@ -5,6 +5,7 @@ import signal
 import subprocess
 
 import omnidyn
+from omnidyn.model.keys import Key, find_key
 from tests.support.pages import choose_axebot, command, drop, laid_out, load_again, numbers, shown, tab, verdict
 from tests.support.pages import write_log as written
 
@@ -64,7 +65,7 @@ def test_the_line_says_what_is_done_and_what_comes_next_and_the_address_keeps_th
 
 
 def test_a_process_that_ends_is_said_and_run_again(browser, tmp_path):
-    path = written(tmp_path / "long.csv", 300.0)
+    path = written(tmp_path / "long.csv", 120.0)
     studio, page = browser.start(path)
     verdict(page)
     choose_axebot(page)
@@ -152,3 +153,47 @@ def test_robots_are_seen_edited_renamed_and_removed_and_a_map_is_none(browser, t
     page.get_by_label("Remove heavier.toml").click()
     page.wait_for_function("!document.querySelector('.panels').innerText.includes('heavier.toml')")
     assert states(page)["Robot"] == ("○", "none chosen")
+
+
+def press_on(page, selector):
+    """Go to an element by Tab alone, as somebody without a mouse, and press Enter on it."""
+    page.wait_for_selector(f"{selector}:not([disabled])")
+    for _ in range(120):
+        page.keyboard.press("Tab")
+        if page.evaluate("name => !!document.activeElement?.matches(name)", selector):
+            return page.keyboard.press("Enter")
+    raise AssertionError(f"Tab does not reach {selector}")
+
+
+def test_by_keyboard_from_two_logs_of_which_one_has_a_wrong_sign_to_a_robot_file(browser, tmp_path):
+    def turn(twist):
+        twist[:, 1] *= -1.0
+
+    right, other, wrong = (tmp_path / name for name in ("right.csv", "other.csv", "wrong.csv"))
+    written(right, 12.0)
+    written(other, 12.0, 2)
+    written(wrong, 12.0, 2, turn)
+    _, page = browser.start()
+    with page.expect_file_chooser() as chooser:
+        press_on(page, "omni-drop")
+    chooser.value.set_files([str(right), str(wrong)])
+    said = "words => document.querySelector('.q-tabs')?.innerText.includes(words)"
+    page.wait_for_function(said, arg="2 logs")
+    press_on(page, "#next-log")
+    press_on(page, "[aria-label='Choose axebot']")
+    page.wait_for_function(said, arg="1 of 2 logs not usable")  # all is checked again: nothing is drawn anew now
+    press_on(page, "#next-robot")
+    page.wait_for_selector(".free .q-chip")
+    page.get_by_text("wrong.csv: vy goes the other way than the voltages drive the robot").wait_for()
+    press_on(page, "[aria-label='mend wrong.csv']")
+    page.wait_for_function(said, arg="2 logs")
+    press_on(page, "#fit")
+    words = verdict(page, "#fit-verdict")
+    with page.expect_download() as download:
+        press_on(page, "a[href='/fit/robot.toml']")
+    saved = omnidyn.load_robot(download.value.path().rename(tmp_path / "robot.toml"))
+    assert "Failed" not in words
+    said = command("identify", right, other, "--robot", "axebot", "--json")[0]
+    for key, number in said["parameters"].items():
+        if find_key(key):
+            assert Key.parse(key).get(saved) == number["value"], key

@@ -72,7 +72,7 @@ def test_two_logs_are_put_on_one_time_axis(browser, tmp_path):
     assert all(cells[key] == f"{number['value']:.5g}" for key, number in said["parameters"].items())
     tab_plot = "[...document.querySelectorAll('omni-plot')].find((p) => p.meta?.title)"
     page.wait_for_function(f"{tab_plot}?.first?.shown")
-    assert page.evaluate(f"{tab_plot}.meta.title") == "held-out log: camera.csv"
+    page.wait_for_function(f"{tab_plot}?.meta?.title === 'camera.csv (hold out)'")
 
 
 def test_a_good_log_and_three_bad_ones_that_a_button_mends(browser, tmp_path):

@@ -3,6 +3,8 @@
 import asyncio
 import queue
 import shlex
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +14,16 @@ pytest.importorskip("nicegui", reason="the extra studio is not installed")
 
 import omnidyn
 from omnidyn.cli import main
-from omnidyn.model.keys import Key
+from omnidyn.model.keys import Key, find_key
 from omnidyn.studio import calls
 from omnidyn.studio.calls import LogFile
 from omnidyn.studio.compare.state import Comparing
 from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.job import shown
 from omnidyn.studio.jobs import JOBS
+from omnidyn.studio.script import script
 from omnidyn.studio.session import Session
+from omnidyn.studio.task import Task
 from omnidyn.studio.track.state import Tracks
 from tests.support.pages import command, write_log
 
@@ -154,19 +158,39 @@ def three_maps(tmp_path, monkeypatch):
     made._folder.cleanup()
 
 
-def test_logs_of_different_maps_give_by_hand_what_the_page_gives(three_maps):
+FREE = ("friction.axes.coulomb[0]", "friction.axes.viscous[2]")  # the other numbers are fixed
+NOTE = "'" * 3 + chr(10) + " import os"  # of a user: no code
+
+
+@pytest.mark.parametrize("free", [(), FREE])
+def test_logs_of_different_maps_give_by_hand_what_the_page_gives(three_maps, free):
     session, fitting = three_maps, Fitting(three_maps)
     fitting.hold_out([log.key for log in session.logs.values() if log.name == "another_column.csv"])
+    fitting._choices_of = session.robot_path
+    asyncio.run(fitting._choose(session.robot_path))
+    fitting.set_free(list(free) or fitting.free)
     asyncio.run(fitting.run())
     assert fitting.last.result, fitting.last.error
     (fit,) = by_hand(fitting.last.command, fitting.last.python)
     on_page = fitting.last.result["values"]
     assert {name: float(value) for name, value in fit.estimate.value.items()} == on_page
     of_command, of_page = omnidyn.load_robot("fitted.toml"), omnidyn.load_robot(fitting.last.folder / "robot.toml")
-    for name in on_page:
+    for name in filter(find_key, on_page):
         assert Key.parse(name).get(of_command) == Key.parse(name).get(of_page)
     assert fit.headline == fitting.last.result["verdict"]
     assert not fitting.last.result["failed"]
+    assert set(on_page) >= set(free)
+    fitting.note("fit-1.toml", NOTE)
+    work = script(fitting, {"compare": Task(), "track": Task()})
+    assert "eval" not in work
+    assert str(session.folder) not in work
+    for path in Path().glob("*-columns.toml"):
+        path.unlink()  # the script has them
+    with redirect_stdout(StringIO()) as out:
+        exec(compile(work, "work.py", "exec"), {})
+    assert fitting.last.result["verdict"] in out.getvalue()
+    of_script, of_page = Path("fit-1.toml"), fitting.last.folder / "robot.toml"
+    assert of_script.read_text("utf-8") == of_page.read_text("utf-8")
 
 
 def by_hand_as_json(words, python):

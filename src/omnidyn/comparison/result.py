@@ -94,6 +94,20 @@ class Comparison(Displayable):
         """Component -> rmse of the first robot, in SI units."""
         return {name: metrics.rmse for name, metrics in self.overall[self.robots[0]].items()}
 
+    def rmse_of_log(self, log: int, robot: str = "") -> dict[str, float]:
+        """Component -> rmse over one log, in SI units; of the first robot by default. log: which one, from 0.
+
+        sqrt(sum of n rmse^2 / sum of n) over its segments of n samples; what was not measured in it is left out.
+        """
+        of_log = {}
+        for name, scores in self.by_segment[robot or self.robots[0]].items():
+            pairs = zip(self.segments, scores, strict=True)
+            kept = [metrics for at, metrics in pairs if at.log == log and metrics is not None and metrics.samples]
+            if kept:
+                squares = sum(metrics.samples * metrics.rmse**2 for metrics in kept)
+                of_log[name] = float(np.sqrt(squares / sum(metrics.samples for metrics in kept)))
+        return of_log
+
     @property
     def fit_percent(self) -> dict[str, float | None]:
         """Component -> fit of the first robot [%], None where the measured signal never changes."""

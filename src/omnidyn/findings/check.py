@@ -29,6 +29,7 @@ from omnidyn.findings.slip import check_axes, check_slip
 from omnidyn.findings.time_base import begin, between
 from omnidyn.findings.values.copies import check_copies
 from omnidyn.findings.values.values import check_echo, check_values
+from omnidyn.findings.wiring.against_drive import check_against_drive
 from omnidyn.findings.wiring.twist_frame import check_twist_frame
 from omnidyn.findings.wiring.wheels import check_wiring
 from omnidyn.logs.channels import TIME
@@ -50,6 +51,7 @@ FAMILIES: tuple[Family, ...] = (
     check_derivatives,
     check_turn_rate,
     check_wiring,
+    check_against_drive,
     check_dead_wheels,
     check_slip,
     check_axes,

@@ -56,8 +56,9 @@ class LogFile:
 
     @property
     def request(self) -> dict[str, Any]:
-        """How a job reads it."""
-        return {"path": self.path, "map": self.map, "unsigned": self.unsigned}
+        """How a job reads it. name: that no other log of the session has, for what is written of it."""
+        name = f"{self.stem}{Path(self.name).suffix}"
+        return {"path": self.path, "name": name, "map": self.map, "unsigned": self.unsigned}
 
     @property
     def reading(self) -> tuple[str, bool]:

@@ -6,6 +6,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,8 @@ from omnidyn.comparison.traces import unit as unit_of
 from omnidyn.compiled.listeners import COMPILING, heard
 from omnidyn.document import Document, Points, Table
 from omnidyn.logs.columns.mapping import load_map
-from omnidyn.logs.read_log import LogOptions
+from omnidyn.logs.log import Log
+from omnidyn.logs.read_log import LogOptions, recorded_log
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Report
 from omnidyn.statement import NOTE
@@ -85,10 +87,15 @@ def options_of(log: Mapping[str, Any]) -> LogOptions:
     return LogOptions(columns=columns, current_unsigned=bool(log.get("unsigned")))
 
 
-def write_free_runs(comparison: Comparison, log: int, folder: Path, **more: Any) -> bool:
+def read(log: Mapping[str, Any], robot: Robot | None) -> Log:
+    """A log of a request, as recorded; its name stands in all that is said and written of it, and no path."""
+    return replace(recorded_log(log["path"], robot, options_of(log)), source=log["name"])
+
+
+def write_free_runs(comparison: Comparison, log: int, folder: Path, *, residuals: bool = False, **more: Any) -> bool:
     """A panel for each component of a log: measured, and the free run of each robot; whether there is one.
 
-    more: what a page needs beside them.
+    residuals: measured minus each free run instead. more: what a page needs beside them.
     """
     segments = [segment for segment in comparison.segments if segment.log == log]
     panels, columns = [], []
@@ -96,9 +103,11 @@ def write_free_runs(comparison: Comparison, log: int, folder: Path, **more: Any)
         traces = {
             robot: [comparison.trace(robot, name, segment) for segment in segments] for robot in comparison.robots
         }
-        columns.append(np.concatenate([trace.measured for trace in traces[comparison.robots[0]]]))
-        columns += [np.concatenate([trace.model for trace in parts]) for parts in traces.values()]
-        panels.append({"title": name, "unit": unit_of(name), "signals": ["measured", *traces]})
+        measured = np.concatenate([trace.measured for trace in traces[comparison.robots[0]]])
+        models = [np.concatenate([trace.model for trace in parts]) for parts in traces.values()]
+        columns += [measured - model for model in models] if residuals else [measured, *models]
+        title = f"{name}: measured minus model" if residuals else name
+        panels.append({"title": title, "unit": unit_of(name), "signals": ["measured"] * (not residuals) + [*traces]})
     if panels:
         t = np.concatenate([comparison.measured[log].t[segment.rows] for segment in segments])
         write_series(folder, t, panels, np.array(columns), **more)

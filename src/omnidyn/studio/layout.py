@@ -113,7 +113,15 @@ def show(studio: Studio, tab: str = "") -> None:
             with ui.row().classes("line next").props("role=status id=next"):
                 ui.label(f"Next: {after.next}.").classes("text")
 
+    def undo() -> None:
+        """What was removed last, and a button that brings it back."""
+        if session.removed is not None:
+            with ui.row().classes("line").props("role=status id=removed"):
+                ui.label(f"Removed {session.removed.name}.").classes("text quiet")
+                ui.button("Undo", on_click=session.undo).props("outline dense no-caps id=undo")
+
     page.part(line, LOGS, PROGRESS, ROBOT, FIT)
+    page.part(undo, LOGS, ROBOT, of=lambda: session.removed)
     first = next((name for name in tabs if name.lower() == tab.lower()), next(iter(tabs)))
     with ui.tab_panels(page.tabs, value=first, animated=False).classes("panels"):
         for name, part in tabs.items():

@@ -11,7 +11,7 @@ from nicegui import ui
 from omnidyn.studio.elements import verdict
 from omnidyn.studio.parts import FIT, LOGS, ROBOT
 from omnidyn.studio.session import Session
-from omnidyn.studio.steps import DONE, StepState
+from omnidyn.studio.steps import DONE, READY, WAITING, StepState
 from omnidyn.studio.task import Task, progress_of
 
 STEPS = (  # what a newcomer does: title, and words
@@ -56,25 +56,28 @@ class Page:
     def next_step(self, name: str) -> None:
         """What comes after this tab, as its one primary button; on a tab that is not done, what is missing."""
 
-        def show() -> None:
+        def after() -> str:
             line = self.line()
             places = {step.name: k for k, step in enumerate(line)}
             if line[places[name]].state != DONE:
-                return
-            after = next(step for step in line[places[name] + 1 :] if step.state != DONE)
-            with ui.row().classes("line"):
-                ui.button(f"Next: {after.name}", on_click=lambda: self.go(after.name)).props(
-                    f"unelevated no-caps id=next-{name.lower()}"
-                )
+                return ""
+            return next(step.name for step in line[places[name] + 1 :] if step.state != DONE)
 
-        self.part(show, LOGS, ROBOT, FIT)
+        def show() -> None:
+            if step := after():
+                with ui.row().classes("line"):
+                    ui.button(f"Next: {step}", on_click=lambda: self.go(step)).props(
+                        f"unelevated no-caps id=next-{name.lower()}"
+                    )
+
+        self.part(show, LOGS, ROBOT, FIT, of=after)
 
     def empty(self, name: str) -> None:
         """The three steps, and a picture, where this tab has nothing to show yet."""
 
         def show() -> None:
             line = self.line()
-            if all(step.state == DONE for step in line[: 1 if name == "Log" else 2]):
+            if all(step.state not in (READY, WAITING) for step in line[: 1 if name == "Log" else 2]):
                 return
             with ui.element("div").classes("empty"):
                 ui.image("/static/steps.svg").props("alt='A robot seen from above, its log, and the fitted curve'")
@@ -84,14 +87,27 @@ class Page:
                             ui.label(f"{words[0]} ({step.words})").classes("strong")
                             ui.label(words[1]).classes("quiet")
 
-        self.part(show, LOGS, ROBOT, FIT)
+        self.part(show, LOGS, ROBOT, FIT, of=self.line)
 
-    def part(self, make: Callable[[], None], *parts: str) -> None:
-        """A piece of the page that is made again when one of these parts of the session changes."""
+    def part(self, make: Callable[[], object], *parts: str, of: Callable[[], Any] | None = None) -> None:
+        """A piece of the page that is made again when one of these parts of the session changes.
+
+        of: what it shows; where that is the same, it stays, and with it the focus and a click that is under way.
+        """
         shown = ui.refreshable(make)
         shown()
+        last = [of() if of is not None else None]
+
+        def refresh() -> None:
+            if of is None:
+                shown.refresh()
+                return
+            before, last[0] = last[0], of()
+            if last[0] != before:
+                shown.refresh()
+
         for part in parts:
-            self.parts.setdefault(part, []).append(shown.refresh)
+            self.parts.setdefault(part, []).append(refresh)
 
     def mirror(self, choice: Any, part: str, get: Callable[[], Any], name: str = "") -> None:
         """Let a choice show what another page chose when a part changes; it is not made again: it may be open.
@@ -189,6 +205,10 @@ class Page:
         plot._props |= {"data-panels": str(len(self.session.series[series].meta["panels"]))}
         plot._props |= {"data-other": other, "data-offset": str(offset)} if other else {}
         return plot
+
+    def robots(self) -> tuple[list[str], str]:
+        """The robots of the session, and the one that is chosen."""
+        return list(self.session.robots), self.session.robot
 
     def robot_choice(self) -> None:
         """The robot of the session, and a place to drop a robot file."""

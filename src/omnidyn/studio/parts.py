@@ -5,3 +5,4 @@ FREE = "free"  # what can be free of the robot
 DRIVE, VIEW, NUMBERS = "drive", "view", "numbers"  # the drive: its buttons, the robot, the numbers of the robot
 TRACK, PATH, TRACK_START = "track", "path", "track start"  # what controllers did; their path; the button
 COMPARE, DRIFT, COMPARE_START = "compare", "drift", "compare start"  # robots over logs; fits; their buttons
+FITTED, HELD_OUT, LEFT_OUT = "fit", "hold out", "leave out"  # what a log is used for

@@ -25,7 +25,7 @@ from nicegui import ui
 from starlette.background import BackgroundTask
 
 from omnidyn.errors import InputError
-from omnidyn.studio import workspace
+from omnidyn.studio import script, workspace
 from omnidyn.studio.drive.state import Driving
 from omnidyn.studio.guard import Guard
 from omnidyn.studio.layout import Studio, show
@@ -129,8 +129,8 @@ def _add_files(app: FastAPI, studio: Studio) -> None:
     async def upload(request: Request, name: str, kind: str = "") -> Response:
         try:
             return JSONResponse({"name": await session.upload(name, request.stream(), kind)})
-        except RefusedError:
-            return Response(status_code=413)
+        except RefusedError as error:
+            return JSONResponse({"error": str(error)}, 413)
         except InputError as error:
             return JSONResponse({"error": session.shown(str(error))}, 400)
 
@@ -141,6 +141,13 @@ def _add_files(app: FastAPI, studio: Studio) -> None:
         except InputError as error:
             return PlainTextResponse(session.shown(str(error)), 400)
         return FileResponse(path, filename=path.name, background=BackgroundTask(path.unlink))
+
+    @app.get("/script")
+    async def save_script() -> Response:
+        comparing = studio.comparing
+        others = {"compare": comparing.last, "drift": comparing.last_drift, "track": studio.tracks.last}
+        named = {"content-disposition": f'attachment; filename="{script.FILE_NAME}"'}
+        return PlainTextResponse(script.script(studio.fitting, others), headers=named)
 
     @app.get("/series/{key}")
     async def series(key: str) -> Response:

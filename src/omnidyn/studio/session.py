@@ -10,10 +10,8 @@ import asyncio
 import contextlib
 import inspect
 import itertools
-import json
 import re
 import shutil
-import sys
 import tempfile
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -25,10 +23,16 @@ from omnidyn.model.presets import robot_path
 from omnidyn.progress import Report
 from omnidyn.studio.calls import LogFile
 from omnidyn.studio.parts import COMPARE, FIT, LOGS, PROGRESS, ROBOT, TRACK
+from omnidyn.studio.removed import Removed
 from omnidyn.studio.series import META, Series
+from omnidyn.studio.words import each_text, in_page_names
 from omnidyn.studio.worker import CancelledError, EndedError, JobError, Worker
 
 MAX_FILES, MAX_FILE_BYTES, MAX_BYTES = 50, 2**30, 4 * 2**30  # of uploads
+TOO_LARGE = (
+    f"too large: {MAX_FILE_BYTES // 2**30} GiB each and {MAX_BYTES // 2**30} GiB in all are the most. "
+    "Name it on the command line instead."
+)
 ROBOT_SUFFIX = ".toml"
 MAX_NAME = 80
 
@@ -51,6 +55,8 @@ class Session:
         self.listeners: set[Callable[[str], None]] = set()
         self.workers = {name: Worker() for name in ("log", "fit", "drive", TRACK, COMPARE, "warm")}
         self.others = 0  # files that are neither logs nor robots
+        self.made = set[str]()  # keys of logs and names of robots that were made here, not brought: no edit takes them
+        self.removed: Removed | None = None
         self.takers: dict[str, Callable[[str, str], object]] = {"": self.add_log, ROBOT_SUFFIX: self.take_robot}
         self.count, self._bytes, self._tasks = 0, 0, set[asyncio.Task[Any]]()
 
@@ -89,7 +95,8 @@ class Session:
         """Take files that the command line names: logs, and robot files by their suffix."""
         for path in paths:
             if path.lower().endswith(ROBOT_SUFFIX):
-                self.robots[path] = self.robot = path
+                name = self.free_name(Path(path).name)
+                self.robots[name], self.robot = path, name
             else:
                 taken = self.taker(Path(path).suffix.lower())(path, path)
                 if inspect.isawaitable(taken):
@@ -111,16 +118,18 @@ class Session:
 
         kind: what it is, one of `takers`; "" where its suffix says it.
         """
-        if len(self.logs) + len(self.robots) + self.others >= MAX_FILES:
-            raise RefusedError(f"{MAX_FILES}")
+        if self.brought >= MAX_FILES:
+            raise RefusedError(self.room)
         safe = safe_name(name)
         path, size = self.new_folder() / safe, 0
         try:
             with path.open("xb") as file:
                 async for block in body:
                     size += len(block)
+                    if self._bytes + size > MAX_BYTES:
+                        self._forget_removed()
                     if size > MAX_FILE_BYTES or self._bytes + size > MAX_BYTES:
-                        raise RefusedError(f"{MAX_FILE_BYTES}")
+                        raise RefusedError(TOO_LARGE)
                     file.write(block)
         except BaseException:
             path.unlink(missing_ok=True)
@@ -137,33 +146,69 @@ class Session:
 
     def without_paths(self, result: Any) -> Any:
         """A result of a job, its words as pages show them."""
-        return json.loads(self.shown(json.dumps(result)))
+        return each_text(result, self.shown)
 
     def make_room(self, count: int, size: int) -> None:
         """Count files that lie in the folder of the session [bytes]. Raises RefusedError for too many."""
-        if len(self.logs) + len(self.robots) + self.others + count > MAX_FILES or self._bytes + size > MAX_BYTES:
-            raise RefusedError
+        if self.brought + count > MAX_FILES or self._bytes + size > MAX_BYTES:
+            raise RefusedError(f"{count} files more. {self.room}")
         self._bytes += size
+
+    @property
+    def brought(self) -> int:
+        """How many files the user brought."""
+        return len({*self.logs} - self.made) + sum(map(self.is_editable, self.robots)) + self.others
+
+    @property
+    def room(self) -> str:
+        """How many files there may be, in words."""
+        count, each = f"{self.brought} of at most {MAX_FILES} files", f"{MAX_FILE_BYTES // 2**30} GiB each"
+        return f"{count}, {each}.{' Remove one first.' * (self.brought >= MAX_FILES)}"
 
     def taker(self, kind: str) -> Callable[[str, str], object]:
         """What takes a file of a kind, by its path and the name that pages show; what is no other kind is a log."""
         return self.takers.get(kind, self.add_log)
 
     def shown(self, words: str) -> str:
-        """Words without the folders of uploads, of results, and of files that the command line named."""
+        """Words as pages have them: no folders of uploads, of results, and of files that the command line named."""
         words = re.sub(rf"{re.escape(str(self.folder))}/(?:\d+/)+", "", words)
         for path in (*(log.path for log in self.logs.values()), *self.robots.values()):
-            words = words.replace(path, Path(path).name)
-        return words
+            for name in (path, str(Path(path).absolute())):
+                words = words.replace(name, Path(path).name)
+        return in_page_names(words)
 
     def remove(self, log: LogFile) -> None:
-        """Forget a log; one that was uploaded is deleted."""
+        """Take a log away; one that was uploaded is deleted when something else is removed, and can be brought back."""
         self.logs.pop(log.key, None)
-        path = Path(log.path)
-        if self.folder in path.parents:
-            self._bytes -= path.stat().st_size if path.exists() else 0
-            path.unlink(missing_ok=True)
-        self.changed(LOGS, FIT)
+
+        def restore() -> None:
+            self.logs[log.key] = log
+
+        def discard() -> None:
+            path = Path(log.path)
+            if self.folder in path.parents:
+                self._bytes -= path.stat().st_size if path.exists() else 0
+                path.unlink(missing_ok=True)
+
+        self._remove(Removed(log.label, restore, discard))
+
+    def _remove(self, removed: Removed) -> None:
+        self._forget_removed()
+        self.removed = removed
+        self.changed(LOGS, ROBOT, FIT)
+
+    def _forget_removed(self) -> None:
+        """Delete the file of what was removed last: it cannot come back any more."""
+        removed, self.removed = self.removed, None
+        if removed is not None:
+            removed.discard()
+
+    def undo(self) -> None:
+        """Bring back what was removed last."""
+        removed, self.removed = self.removed, None
+        if removed is not None:
+            removed.restore()
+            self.changed(LOGS, ROBOT, FIT)
 
     async def example(self) -> str:
         """A simulated log to begin with; an error in words, or ""."""
@@ -173,8 +218,8 @@ class Session:
         except (JobError, CancelledError) as error:
             return str(error)
         self.robot = self.robot or "axebot"
-        self.add_log(str(path), path.name)
-        self.changed(ROBOT)
+        self.made.add(self.add_log(str(path), path.name).key)
+        self.changed(LOGS, ROBOT)
         return ""
 
     async def check(self, log: LogFile) -> None:
@@ -260,12 +305,17 @@ class Session:
         """Whether a robot is a file, not a preset."""
         return self.robots.get(name, name) not in self.presets
 
+    def is_editable(self, name: str) -> bool:
+        """Whether an edit may take the place of a robot: no preset, no fit."""
+        return self.is_file(name) and name not in self.made
+
     def robot_text(self, name: str) -> str:
         """The file of a robot."""
         return Path(robot_path(self.robots[name])).read_text("utf-8", "replace")
 
     def add_robot(self, path: str, name: str) -> None:
         """Take a robot file, and choose it; logs are checked with it, also where one of this name was chosen before."""
+        name = self.free_name(name) if name in self.made else name
         self.robots[name], self.robot = path, ""
         self.choose(name)
 
@@ -286,32 +336,35 @@ class Session:
     async def keep_robot(self, text: str, name: str, of: str) -> str:
         """Keep a text as a robot file; an error in words, or "". of: the robot it was made of, which gets this name."""
         name = f"{safe_name(name.removesuffix(ROBOT_SUFFIX))}{ROBOT_SUFFIX}"
-        if name != of and name in self.robots:
+        if (name != of or of in self.made) and name in self.robots:
             return str(InputError("there is a robot of this name", got=name, remedy="use another name"))
         path = self.new_folder() / name
         path.write_text(text, "utf-8")
-        before = of if name != of and self.is_file(of) else ""
         try:
             await self.take_robot(str(path), name)
         except InputError as error:
             return str(error)
-        if before:
-            self.robots.pop(before)
+        if name != of and self.is_editable(of):
+            self.robots.pop(of)
             self.changed(ROBOT)
         return ""
 
     def remove_robot(self, name: str) -> None:
-        """Forget a robot file."""
-        self.robots.pop(name, None)
-        if self.robot == name:
-            self.robot = ""
-        self.changed(ROBOT, FIT)
+        """Take a robot file away; it can be brought back."""
+        path, chosen = self.robots.pop(name), self.robot == name
+        self.robot = self.robot * (not chosen)
+
+        def restore() -> None:
+            self.robots[back := self.free_name(name)] = path
+            self.robot = back if chosen and not self.robot else self.robot
+
+        self._remove(Removed(name, restore, lambda: None))
 
     def free_name(self, name: str) -> str:
         """The name, or the next one that no robot has yet."""
         stem, _, suffix = name.rpartition(".")
-        names = (f"{stem}-{k}.{suffix}" for k in itertools.count(2))
-        return next(free for free in itertools.chain((name,), names) if free not in self.robots)
+        others = (f"{stem}-{k}.{suffix}" for k in itertools.count(2))
+        return next(free for free in itertools.chain((name,), others) if free not in self.robots)
 
     def choose(self, name: str) -> None:
         """Choose a robot; logs are checked with it."""
@@ -320,22 +373,6 @@ class Session:
             for log in self.logs.values():
                 self.start(self.check(log))
             self.changed(ROBOT, FIT)
-
-    async def make_robot(self, name: str, options: list[str]) -> str:
-        """The robot that `omnidyn init` writes for these options; an error in words, or ""."""
-        path = self.new_folder() / f"{safe_name(name)}{ROBOT_SUFFIX}"
-        process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "omnidyn", "init", path.stem, *options, "-o", str(path)),
-            stdin=asyncio.subprocess.DEVNULL,
-            stdout=asyncio.subprocess.DEVNULL,
-            stderr=asyncio.subprocess.PIPE,
-        )
-        _, said = await process.communicate()
-        if process.returncode:
-            words = said.decode("utf-8", "replace").strip().removeprefix("omnidyn: error: ")
-            return self.shown(words) or str(EndedError(process.returncode))
-        self.add_robot(str(path), path.name)
-        return ""
 
 
 def safe_name(name: str) -> str:

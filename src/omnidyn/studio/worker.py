@@ -9,9 +9,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import shutil
 import signal
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from omnidyn.errors import OmnidynError
@@ -61,11 +63,16 @@ class Worker:
                     heard[0] = True
                     listen(kind, value)
 
+                folder = Path(request["folder"]) if "folder" in request else None
+                was_there = folder is not None and folder.exists()
                 try:
                     return await self._result(await self._started(), job, request, hear)
                 except EndedError:
                     if self._process is not before or heard[0]:
                         raise
+                if folder is not None:  # what it may have begun to write
+                    shutil.rmtree(folder, ignore_errors=True)
+                    folder.mkdir() if was_there else None
                 return await self._result(await self._started(), job, request, listen)  # it had ended while it waited
             finally:
                 self.busy = False

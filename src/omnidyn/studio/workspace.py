@@ -36,7 +36,7 @@ END, END_BYTES, END_64, END_64_BYTES = b"PK\x05\x06", 22, b"PK\x06\x07", 20  # o
 FORM: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
     "logs": (("name",), ("unsigned", "held_out"), ("file",), ("map",)),
     "robots": (("name",), (), ("file",), ()),
-    "fits": (("name", "verdict"), ("failed",), ("robot", "numbers", "warnings"), ("report",)),
+    "fits": (("name", "verdict", "note"), ("failed",), ("robot", "numbers", "warnings"), ("report",)),
 }
 FIT_FILES = {"robot": "robot.toml", "numbers": "numbers.csv", "warnings": "warnings.csv", "report": "report.html"}
 
@@ -75,16 +75,17 @@ def workspace_of(session: Session, fitting: Fitting) -> Workspace:
         columns = space.add("maps", log.map) if log.map else ""
         flags = {"unsigned": log.unsigned, "held_out": log.key in fitting.held_out}
         space.logs.append({"name": log.label, **flags, "file": space.add("logs", log.path, log.label), "map": columns})
-    for name, fit in fitting.fits.items():
+    for name, fit in fitting.history.items():
         if fit.folder is None or fit.result is None:
             continue
         files = {
             key: space.add("fits", fit.folder / file) if (fit.folder / file).is_file() else ""
             for key, file in FIT_FILES.items()
         }
-        space.fits.append({"name": name, "verdict": fit.result["verdict"], "failed": fit.result["failed"], **files})
+        said = {key: fit.result[key] for key in ("verdict", "failed")}
+        space.fits.append({"name": name, "note": fitting.notes.get(name, ""), **said, **files})
     for name, path in session.robots.items():
-        if name not in fitting.fits and Path(path).is_file():
+        if name not in fitting.history and Path(path).is_file():
             space.robots.append({"name": name, "file": space.add("robots", path, name)})
     return space
 
@@ -216,7 +217,8 @@ def adopt(space: Workspace, session: Session, fitting: Fitting) -> None:
         names[entry["name"]] = name
     for entry in space.fits:
         fit = _fit(entry, space.files)
-        names[entry["name"]] = fitting.keep(fit, safe_name(entry["name"]))
+        names[entry["name"]] = name = fitting.keep(fit, safe_name(entry["name"]))
+        fitting.note(name, entry["note"])
         fitting.last = fitting.last if fitting.last.running else fit
     chosen = names.get(space.robot, space.robot)
     session.robot = chosen if chosen in session.robots else session.robot

@@ -8,10 +8,9 @@ from typing import Any
 
 import omnidyn
 from omnidyn.document import Document
-from omnidyn.logs.read_log import recorded_log
 from omnidyn.progress import Progress, Report
 from omnidyn.report.drift_picture import draw_drift
-from omnidyn.studio.job import Tell, options_of, shown, timed, write_free_runs
+from omnidyn.studio.job import Tell, read, shown, timed, write_free_runs
 
 PICTURE = "drift.svg"
 
@@ -32,7 +31,7 @@ def _compared(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     robots = [omnidyn.load_robot(path) for path in request["robots"]]
     runs, unsigned = [], False
     for log in request["logs"]:
-        loaded = recorded_log(log["path"], robots[0], options_of({**log, "unsigned": False}))
+        loaded = read({**log, "unsigned": False}, robots[0])
         run = loaded.to_run()
         runs.append(run.replace(warnings=(*run.warnings, *loaded.columns.doubts)))
         unsigned = unsigned or log["unsigned"]

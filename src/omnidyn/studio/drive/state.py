@@ -46,7 +46,7 @@ class Driving:
             elif kind == "trouble":
                 self.trouble = self.session.shown(value)
             elif kind == "recorded":
-                self.session.add_log(value["path"], Path(value["path"]).name)
+                self.session.made.add(self.session.add_log(value["path"], Path(value["path"]).name).key)
             self.session.changed(NUMBERS if kind == "numbers" else DRIVE)
 
         try:

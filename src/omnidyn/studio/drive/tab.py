@@ -23,7 +23,7 @@ class DriveTab:
 
     def build(self) -> None:
         """Lay it out."""
-        self.page.part(self.page.robot_choice, ROBOT)
+        self.page.part(self.page.robot_choice, ROBOT, of=self.page.robots)
         self.page.part(self._content, DRIVE, ROBOT)
         self.page.part(self._view, VIEW)
         self.page.part(self._calls, ROBOT)

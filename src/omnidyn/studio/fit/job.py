@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import omnidyn
+from omnidyn.comparison.traces import unit as unit_of
 from omnidyn.document import Table, interval_cell
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.estimate import NOT_DETERMINED, Estimate
@@ -18,13 +19,13 @@ from omnidyn.identification.identification import Identification
 from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.prepare import free_by_default, guesses
-from omnidyn.logs.read_log import recorded_log
 from omnidyn.model.keys import EMF, ROTOR, TORQUE, Key, find_key, in_words, unit
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
 from omnidyn.statement import ERROR, SEVERITIES, Statement
-from omnidyn.studio.job import Tell, options_of, robot_of, timed, write_free_runs
-from omnidyn.studio.series import SERIES
+from omnidyn.studio.job import Tell, read, robot_of, timed, write_free_runs
+from omnidyn.studio.parts import FITTED, HELD_OUT
+from omnidyn.studio.words import number_in_words
 
 IDLE = 19  # of a process that waits for all others
 LOADED, COMPILED = 2, 8  # of the first runs: a simulation and a fit; those of the exact engine, seconds each
@@ -44,8 +45,8 @@ CHOICES = (  # what a page offers beside what is free by default; any key can be
 def fit(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
     """What `omnidyn identify` says of logs: verdict, numbers, advice; writes robot, report, table and series.
 
-    request: "robot", "logs" (path, map, unsigned each), "hold_out" (paths), "free" (keys, or none for the default),
-    "folder" of the results.
+    request: "robot", "logs" (path, name, map, unsigned each), "hold_out" (names), "free" (keys, or none for the
+    default), "folder" of the results.
     """
     with timed(tell) as listen:
         return _fitted(request, listen)
@@ -55,13 +56,13 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     folder, robot = Path(request["folder"]), robot_of(request)
     folder.mkdir(parents=True)
     listen(Report("reading"))
-    logs = [recorded_log(log["path"], robot, options_of(log)) for log in request["logs"]]
+    logs = [read(log, robot) for log in request["logs"]]
     free = tuple(request.get("free") or ())
     result = omnidyn.identify(
         [log.to_run() for log in logs],
         robot,
         OutputError(free=free) if free else None,
-        hold_out=[glob.escape(path) for path in request["hold_out"]],
+        hold_out=[glob.escape(name) for name in request["hold_out"]],
         progress=listen,
         check=logs,
         keep_best=True,
@@ -86,7 +87,7 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
         "warnings": warnings,
         "advice": [str(step) for step in result.advice],
         "remedies": _remedies(result),
-        "series": [SERIES] * _write_free_run(result, folder / SERIES),
+        **_free_runs(result, folder),
     }
     shown["report"] = _write_report(result, request, folder / "report.html")
     return shown
@@ -101,7 +102,7 @@ def _numbers(estimate: Estimate) -> Table:
     """Every number with its interval."""
     if isinstance(estimate, OutputErrorEstimate):
         table = number_table(estimate)
-        return replace(table, rows=[(row[0], *row[1:]) for row in table.rows])
+        return replace(table, rows=[(row[0] or number_in_words(row[1]), *row[1:]) for row in table.rows])
     rows = [
         (
             in_words(name),
@@ -154,14 +155,31 @@ def _remedies(result: Identification) -> list[dict[str, str]]:
     ]
 
 
-def _write_free_run(result: Identification, folder: Path) -> bool:
-    """The free run over the first log that was held out, or fitted; whether there is one."""
+def _free_runs(result: Identification, folder: Path) -> dict[str, Any]:
+    """The free run over each log and what it leaves, those that were held out first.
+
+    "logs": a table of their errors. "series": folders. "runs": what a page calls a log -> its free run, its residuals.
+    """
     validation = result.validation if isinstance(result.method, OutputError) else None
     if validation is None:
-        return False
-    comparison = validation.held_out or validation.fitted
-    title = "held-out log" if validation.held_out else "fitted log"
-    return write_free_runs(comparison, 0, folder, title=f"{title}: {Path(comparison.measured[0].source).name}")
+        return {"series": [], "runs": {}, "logs": {"head": [], "rows": []}}
+    rows, runs, channels = [], {}, dict[str, None]()
+    for use, comparison in ((HELD_OUT, validation.held_out), (FITTED, validation.fitted)):
+        for k, run in enumerate(comparison.measured if comparison is not None else ()):
+            assert comparison is not None
+            errors, title = comparison.rmse_of_log(k), f"{run.source} ({use})"
+            rows.append((run.source, use, errors))
+            channels |= dict.fromkeys(errors)
+            name, rest = f"run-{len(rows)}", f"rest-{len(rows)}"
+            if write_free_runs(comparison, k, folder / name, title=title):
+                write_free_runs(comparison, k, folder / rest, residuals=True, title=title)
+                runs[title] = [name, rest]
+    head = ["log", "use", *(f"rmse of {name} [{unit_of(name)}]" for name in channels)]
+    table = [
+        [log, use, *(f"{errors[name]:.3g}" if name in errors else "" for name in channels)] for log, use, errors in rows
+    ]
+    names = [name for pair in runs.values() for name in pair]
+    return {"series": names, "runs": runs, "logs": {"head": head, "rows": table}}
 
 
 def _write_report(result: Identification, request: Mapping[str, Any], path: Path) -> bool:

@@ -2,25 +2,44 @@
 
 from __future__ import annotations
 
-import shutil
+import re
+from dataclasses import dataclass, replace
 from typing import Any
 
 from omnidyn.studio import calls
 from omnidyn.studio.calls import LogFile
-from omnidyn.studio.parts import FIT, FREE, ROBOT
+from omnidyn.studio.parts import FIT, FITTED, FREE, HELD_OUT, LEFT_OUT, ROBOT
+from omnidyn.studio.robot.rename import rename_robot
 from omnidyn.studio.session import Session
 from omnidyn.studio.task import Task
 from omnidyn.studio.worker import CancelledError, JobError
 
-FITTED, HELD_OUT, LEFT_OUT = "fit", "hold out", "leave out"  # what a log is used for
+MAX_NOTE = 500  # characters
+NAME = re.compile(r"^name = .*$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What a fit was made of: logs as they were read then, those held out, the robot's name and file, what was free."""
+
+    logs: tuple[LogFile, ...]
+    held_out: tuple[LogFile, ...]
+    robot: str
+    path: str
+    free: tuple[str, ...]
 
 
 class Fitting:
-    """The last fit, all that gave a robot by the name of its file, and the keys of the logs that are held out."""
+    """The fit that is shown, and the history: all that gave a robot, by the name of its file.
+
+    notes: of a user, by the same names. recipes: of those that were made here, not opened with a workspace.
+    """
 
     def __init__(self, session: Session) -> None:
         self.session, self.last = session, Task()
         self.fits: dict[str, Task] = {}
+        self.notes: dict[str, str] = {}
+        self.recipes: dict[str, Recipe] = {}
         self._held_out, self._left_out = list[str](), list[str]()
         self.choices: dict[str, Any] = {"default": [], "others": []}  # what can be free of the robot `_choices_of`
         self.free: list[str] = []
@@ -110,27 +129,73 @@ class Fitting:
         free = self.free_keys
         logs, held_out = self.logs, [self.session.logs[key] for key in self.held_out]
         command, python = calls.fit(logs, held_out, self.session.robot_path, free)
-        self.last.end(self.session)
+        recipe = Recipe(
+            tuple(replace(log) for log in logs),
+            tuple(replace(log) for log in held_out),
+            self.session.robot,
+            self.session.robot_path,
+            free,
+        )
         self.last = fit = Task(command=command, python=python)
         request = {
             "robot": self.session.robot_path,
             "logs": [log.request for log in logs],
-            "hold_out": [log.path for log in held_out],
+            "hold_out": [log.request["name"] for log in held_out],
             "free": free,
             "command": command,
         }
         self.session.workers["fit"].send({"command": "fit"})  # what warms up makes way
         await fit.run(self.session, FIT, "fit", "fit", request)
         if fit.result is not None:
-            self.keep(fit)
+            self.recipes[self.keep(fit)] = recipe
 
     def keep(self, fit: Task, name: str = "") -> str:
         """Let all tabs take the robot of a fit, under this name or the next free one, which is returned."""
         assert fit.folder is not None
         name = self.session.free_name(name or f"fit-{len(self.fits) + 1}.toml")
-        path = fit.folder / name
-        shutil.copyfile(fit.folder / "robot.toml", path)
+        path, text = fit.folder / name, (fit.folder / "robot.toml").read_text("utf-8")
+        of = NAME.search(text)
+        if of:  # two fits of one robot are told apart by their names
+            stem = path.stem
+            before = of[0].partition("=")[2].strip().strip("\"'").partition(", fit-")[0]
+            text = NAME.sub(lambda _: f'name = "{before}, {stem}"', text, count=1)
+        path.write_text(text, "utf-8")
         self.fits[name] = fit
         self.session.robots[name] = str(path)
+        self.session.made.add(name)
         self.session.changed(ROBOT)
         return name
+
+    def name_of(self, fit: Task) -> str:
+        """The name under which a fit is kept, "" for one that is not."""
+        return next((name for name, kept in self.history.items() if kept is fit), "")
+
+    @property
+    def history(self) -> dict[str, Task]:
+        """All fits whose robot is there, by its name, the oldest first."""
+        return {name: fit for name, fit in self.fits.items() if name in self.session.robots}
+
+    def show(self, name: str) -> None:
+        """Show a fit of the history."""
+        if name in self.fits and not self.last.running:
+            self.last = self.fits[name]
+            self.session.changed(FIT)
+
+    def note(self, name: str, text: str) -> None:
+        """Keep a note to a fit."""
+        self.notes[name] = text[:MAX_NOTE]
+
+    def rename(self, name: str, other: str) -> str:
+        """Give a fit another name; an error in words, or ""."""
+        words = rename_robot(self.session, name, other)
+        if not words:
+            new = next(reversed(self.session.robots))
+            for table in (self.fits, self.notes, self.recipes):
+                if name in table:
+                    table[new] = table.pop(name)  # type: ignore[assignment]
+            self.session.changed(FIT)
+        return words
+
+    def remove(self, name: str) -> None:
+        """Take a fit and its robot away; it can be brought back."""
+        self.session.remove_robot(name)

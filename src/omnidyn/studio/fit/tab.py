@@ -8,11 +8,14 @@ from typing import Any
 
 from nicegui import ui
 
+from omnidyn.document import in_clauses
+from omnidyn.studio.calls import LogFile
 from omnidyn.studio.elements import table, verdict
-from omnidyn.studio.fit.state import FITTED, HELD_OUT, LEFT_OUT, Fitting
+from omnidyn.studio.fit.state import MAX_NOTE, Fitting
 from omnidyn.studio.page import Page
-from omnidyn.studio.parts import FIT, FREE, LOGS, ROBOT
-from omnidyn.studio.series import SERIES
+from omnidyn.studio.parts import FIT, FITTED, FREE, HELD_OUT, LEFT_OUT, LOGS, ROBOT
+from omnidyn.studio.session import ROBOT_SUFFIX
+from omnidyn.studio.task import Task
 
 WHY = {
     "no_log": "Add a log first: tab Log.",
@@ -32,12 +35,14 @@ class FitTab:
     def build(self) -> None:
         """Lay it out."""
         self.page.empty("Fit")
-        self.page.part(self.page.robot_choice, ROBOT)
-        self.page.part(self._uses, LOGS)
+        self.page.part(self.page.robot_choice, ROBOT, of=self.page.robots)
+        self.page.part(self._uses, LOGS, of=self._usable)
+        self.page.part(self._remedies, LOGS, FIT, of=self._wrong)
         self.page.part(self._free, FREE, ROBOT)
-        self.page.part(self._start, FIT, LOGS)
+        self.page.part(self._start, FIT, LOGS, of=self._ready)
         self.page.progress(FIT, lambda: self.fitting.last, "fit")
         self.page.part(self._result, FIT)
+        self.page.part(self._history, FIT, ROBOT, of=self._kept)
 
     def _uses(self) -> None:
         """What each log is used for: fitted, predicted only, or not at all."""
@@ -52,28 +57,56 @@ class FitTab:
                     )
                     use.props(f"no-caps dense unelevated aria-label='use of {log.label}'")
                     self.page.mirror(use, FIT, partial(self.fitting.use_of, key), key)
-                    if log.error or (log.result and log.result["has_errors"]):
+                    if not self._usable()[key][1]:
                         ui.label("not usable as it is: leave it out, or mend it on the tab Log").classes("error-text")
         ui.label("What is held out is predicted, not fitted: that shows what the model is worth.").classes("quiet")
+
+    def _usable(self) -> dict[str, tuple[str, bool]]:
+        """Key of each log -> its label, and whether it can be used as it is."""
+        logs = self.session.logs.items()
+        return {key: (log.label, not log.error and not (log.result and log.result["has_errors"])) for key, log in logs}
 
     def _use(self, key: str) -> Callable[[Any], None]:
         """What takes the use of a log."""
         return lambda event: self.fitting.use(key, event.value)
 
+    def _remedies(self) -> None:
+        """What is wrong with a log and can be mended by reading it another way, each with a button."""
+        for log, finding in self._wrong():
+            with ui.row().classes("line verdict warning"):
+                ui.label("!").classes("mark")
+                ui.label(f"{log.label}: {finding['text']}").classes("text")
+                mend = ui.button(f"Mend {log.label}: {_mend(finding)}")
+                mend.props(f"outline no-caps aria-label='mend {log.label}'")
+                mend.on_click(self._read_anew(log, finding["reading"]))
+
+    def _wrong(self) -> list[tuple[LogFile, dict[str, Any]]]:
+        """Errors of the logs that are used, where another reading mends them."""
+        found = [(log, finding) for log in self.fitting.logs for finding in (log.result or {}).get("findings", ())]
+        return [(log, finding) for log, finding in found if finding["severity"] == "error" and finding["reading"]]
+
+    def _read_anew(self, log: LogFile, reading: dict[str, Any]) -> Callable[[], None]:
+        """What reads a log as its remedy says."""
+        return lambda: self.session.start(self.session.remedy(log, reading))
+
+    def _ready(self) -> tuple[tuple[str, str], bool, str]:
+        """Why there is no fit now, whether one goes on, and what would be fitted."""
+        names = ", ".join(log.label for log in self.fitting.logs)
+        return self.fitting.why_not(), self.fitting.last.running, f"{names}, from {self.session.robot}"
+
     def _start(self) -> None:
         """The button, or why it waits."""
         session = self.session
-        code, words = self.fitting.why_not()
+        (code, words), running, fitted = self._ready()
         with ui.row().classes("line"):
             button = ui.button("Fit", on_click=lambda: session.start(self.fitting.run())).props(
                 "unelevated no-caps id=fit"
             )
-            button.set_enabled(not code and not self.fitting.last.running)
+            button.set_enabled(not code and not running)
             if code:
                 ui.label(words if code in ("unfit", "unread") else WHY[code]).classes("text quiet").props("id=why")
-            elif not self.fitting.last.running:
-                names = ", ".join(log.label for log in self.fitting.logs)
-                ui.label(f"{names}, from {session.robot}").classes("text quiet")
+            elif not running:
+                ui.label(fitted).classes("text quiet")
 
     def _free(self) -> None:
         """What is fitted; at first what `identify` fits of itself."""
@@ -113,14 +146,79 @@ class FitTab:
                 ).props("outline dense no-caps")
         for words in result["advice"]:
             ui.label(f"→ {words}").classes("text")
-        if SERIES in fit.series:
-            ui.label("Free run: the model gets the inputs only").classes("title")
-            self.page.plot(fit.series[SERIES], [], "free-run.png")
+        if result.get("runs"):
+            self._runs(fit, result)
         with self.page.box(f"Warnings and notes ({len(result['warnings'])})"):
             for warning in result["warnings"]:
                 ui.label(f"{warning['severity']}: {warning['text']}").classes("text")
         self.page.calls(fit.command, fit.python)
 
+    def _runs(self, fit: Task, result: dict[str, Any]) -> None:
+        """The error of each log, and its free run or what that leaves."""
+        ui.label("Free run over each log: the model gets the inputs only").classes("title")
+        table(result["logs"], "fit-logs")
+        runs, at = result["runs"], {"log": next(iter(result["runs"])), "kind": 0}
+
+        def look(**more: Any) -> None:
+            at.update(more)
+            picture.props["data-series"] = fit.series[runs[at["log"]][at["kind"]]]
+
+        with ui.row().classes("line"):
+            if len(runs) > 1:
+                ui.select(list(runs), value=at["log"], label="Log", on_change=lambda e: look(log=e.value)).classes(
+                    "wide run-log"
+                )
+            ui.toggle({0: "free run", 1: "residuals"}, value=0, on_change=lambda e: look(kind=e.value)).props(
+                "no-caps dense unelevated id=run-kind"
+            )
+        picture = self.page.plot(fit.series[runs[at["log"]][0]], [], "free-run.png")
+
+    def _kept(self) -> tuple[list[str], str]:
+        """The fits of the history, and the one that is shown."""
+        return list(self.fitting.history), self.fitting.name_of(self.fitting.last)
+
+    def _history(self) -> None:
+        """All fits of the session, to be looked at again, named, noted, removed."""
+        fitting = self.fitting
+        if not fitting.history:
+            return
+        with self.page.box(f"History ({len(fitting.history)})"):
+            with ui.element("div").classes("robots"):
+                for name, fit in reversed(fitting.history.items()):
+                    self._fit_entry(name, fit)
+            with ui.row().classes("line"):
+                ui.link("Save the work as a Python script", "/script").props("download")
+                ui.label("It makes the same numbers from the same logs.").classes("text quiet")
+
+    def _fit_entry(self, name: str, fit: Task) -> None:
+        """A fit of the history."""
+        fitting, stem = self.fitting, name.removesuffix(ROBOT_SUFFIX)
+        trouble = ui.label().classes("text error-text")
+        with ui.row().classes("line entry"):
+            named = ui.input(value=stem).props(f"dense aria-label='name of {stem}'").classes("use")
+
+            def rename() -> None:
+                if named.value and named.value != stem:
+                    trouble.text = fitting.rename(name, str(named.value))
+
+            named.on("change", rename)
+            note = ui.input(placeholder="note", value=fitting.notes.get(name, "")).classes("wide")
+            note.props(f"dense maxlength={MAX_NOTE} aria-label='note to {stem}'")
+            note.on("change", lambda: fitting.note(name, str(note.value or "")))
+            shown = fit is fitting.last
+            button = ui.button("Shown" if shown else "Show", on_click=lambda: fitting.show(name))
+            button.props(f"flat dense no-caps aria-label='show {stem}'").set_enabled(not shown)
+            ui.button("Remove", on_click=lambda: fitting.remove(name)).props(
+                f"flat dense no-caps aria-label='remove {stem}'"
+            )
+        if fit.result is not None:
+            ui.label(in_clauses(fit.result["verdict"])[0]).classes("text quiet")
+
     def _refit(self, key: str) -> Callable[[], None]:
         """What fits again, with a number that the model has not yet."""
         return lambda: self.session.start(self.fitting.run(key))
+
+
+def _mend(finding: dict[str, Any]) -> str:
+    """What the button of a remedy does, in words."""
+    return f"{finding['subject']} with the other sign" if finding["code"] == "inverted" else "apply the remedy"

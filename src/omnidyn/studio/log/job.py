@@ -21,12 +21,12 @@ from omnidyn.logs.channels import components, si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE
 from omnidyn.logs.columns.mapping import ColumnMap, map_to_toml, parse_column
 from omnidyn.logs.log import Log
-from omnidyn.logs.read_log import LogOptions, iter_logs, recorded_log
+from omnidyn.logs.read_log import LogOptions, iter_logs
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
 from omnidyn.run import CHANNELS
 from omnidyn.studio.drive.job import as_measured
-from omnidyn.studio.job import Tell, listener, options_of, robot_of
+from omnidyn.studio.job import Tell, listener, options_of, read, robot_of
 from omnidyn.studio.series import SHOWN, shown_times, write_series
 
 BLOCK = 500_000  # rows that are checked at once, as `omnidyn check` does
@@ -157,7 +157,7 @@ def _write_blocks(blocks: list[Log], folder: Path) -> None:
 def align(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
     """What `omnidyn align` says of two logs. request: "logs" (path, map, unsigned each), "robot"."""
     robot = robot_of(request)
-    first, second = (recorded_log(log["path"], robot, options_of(log)).to_run() for log in request["logs"])
+    first, second = (read(log, robot).to_run() for log in request["logs"])
     alignment = omnidyn.align(first, second)
     verdict = alignment.verdict
     said = " ".join(filter(None, (alignment.document().verdict_text, verdict.remedy_text)))

@@ -11,7 +11,7 @@ from omnidyn.studio import calls
 from omnidyn.studio.calls import LogFile
 from omnidyn.studio.elements import MARK, UNUSED, column_row, verdict
 from omnidyn.studio.page import Page
-from omnidyn.studio.parts import LOGS, PROGRESS
+from omnidyn.studio.parts import LOGS, PROGRESS, ROBOT
 
 
 class LogTab:
@@ -24,11 +24,12 @@ class LogTab:
         """Lay it out."""
         with ui.row().classes("line"):
             ui.element("omni-drop")
+            self.page.part(self._room, LOGS, ROBOT, of=lambda: self.session.room)
             ui.button("Use the example log", on_click=self.page.busy(self.session.example)).props(
                 "outline no-caps id=example"
             )
         self.page.empty("Log")
-        self.page.part(self._choice, LOGS)
+        self.page.part(self._choice, LOGS, of=self._choices)
         self.page.part(self._progress, LOGS, PROGRESS)
         self.page.next_step("Log")
         self.page.part(self._content, LOGS)
@@ -38,12 +39,18 @@ class LogTab:
         logs = self.session.logs
         return logs.get(self.shown) or next(reversed(logs.values()), None)
 
+    def _room(self) -> None:
+        ui.label(self.session.room).classes("text quiet").props("id=room")
+
+    def _choices(self) -> tuple[LogFile | None, dict[str, str]]:
+        """The log that is shown, and the labels of all."""
+        return self._log(), {key: other.label for key, other in self.session.logs.items()}
+
     def _choice(self) -> None:
-        log = self._log()
+        log, names = self._choices()
         if log is None:
             return
         with ui.row().classes("line"):
-            names = {key: other.label for key, other in self.session.logs.items()}
             ui.select(names, value=log.key, label="Log", on_change=lambda e: self._show(e.value)).classes("wide")
             ui.button("Remove", on_click=lambda: self.session.remove(log)).props("flat no-caps")
 

@@ -1,1 +1,1 @@
-"""Tab Robot: the robots of the session: choose, describe, view, edit, rename, remove. Read job, then tab."""
+"""Tab Robot: choose, describe, view, edit, rename and remove robots. Read job, make, rename, then tab."""

@@ -10,6 +10,8 @@ from nicegui import ui
 from omnidyn.model.wheels import ROBOT_RADII, WHEEL_RADII
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import ROBOT
+from omnidyn.studio.robot.make import make_robot
+from omnidyn.studio.session import ROBOT_SUFFIX
 
 
 def _range(limits: tuple[float, float]) -> str:
@@ -25,7 +27,7 @@ class RobotTab:
 
     def build(self) -> None:
         """Lay it out."""
-        self.page.part(self.page.robot_choice, ROBOT)
+        self.page.part(self.page.robot_choice, ROBOT, of=self.page.robots)
         self.page.next_step("Robot")
         with self.page.box("Describe another robot"):
             self._robot_form()
@@ -64,7 +66,9 @@ class RobotTab:
         """The text of a file, to be changed and kept under this name or another one."""
         text = ui.textarea(value=self.session.robot_text(name), label=f"File of {name}").classes("file")
         text.props("outlined autogrow input-class=code")
-        saved = ui.input("keep as", value=name if self.session.is_file(name) else f"my-{name}.toml").classes("wide")
+        saved = ui.input(
+            "keep as", value=name if self.session.is_editable(name) else f"my-{name.removesuffix(ROBOT_SUFFIX)}.toml"
+        ).classes("wide")
         trouble = ui.label().classes("text error-text")
 
         async def keep() -> str:
@@ -75,7 +79,7 @@ class RobotTab:
 
         with ui.row().classes("line"):
             ui.button("Keep", on_click=self.page.busy(keep, trouble)).props("outline no-caps id=keep-robot")
-            ui.label("Another name renames a file of yours; a preset stays as it is.").classes("text quiet")
+            ui.label("Another name renames a file of yours; a preset and a fit stay as they are.").classes("text quiet")
 
     def _robot_form(self) -> None:
         """What `init` asks for, within what robots have, and the robot as it is described."""
@@ -109,7 +113,7 @@ class RobotTab:
 
         async def make() -> str:
             options = [f"{flag}={field.value}" for flag, field in inputs.items() if str(field.value or "").strip()]
-            return await self.session.make_robot(name.value or "", options)
+            return await make_robot(self.session, name.value or "", options)
 
         ui.button("Make this robot", on_click=self.page.busy(make, trouble)).props("outline no-caps id=make-robot")
         ui.label("What is left empty is guessed, with a wide spread, and marked as a guess.").classes("text quiet")

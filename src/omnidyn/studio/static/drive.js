@@ -201,7 +201,7 @@ class Drive extends HTMLElement {
     const end = this.newest[0], begin = end - STRIP / 60, x = (t) => LEFT + (t - begin) / (end - begin) * inner;
     panels.forEach(([title, labels, gets], p) => {
       const top = 20 + p * (high + gap);
-      let most = 1e-6;
+      let most = 0.01; // what rests is no noise
       for (const f of this.strip) for (const get of gets) most = Math.max(most, Math.abs(get(f)) || 0);
       most *= 1.08;
       const y = (v) => top + high / 2 - v / most * high / 2;

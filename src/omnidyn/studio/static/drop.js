@@ -25,12 +25,12 @@ class Drop extends HTMLElement {
     }
   }
   send(file) { // what is wrong, or nothing; fetch tells nothing of its progress
-    const refused = 'too large, or too many files';
+    const refused = 'the studio did not answer';
     return new Promise((done) => {
       const request = new XMLHttpRequest();
       request.open('POST', `/upload?name=${encodeURIComponent(file.name)}&kind=${this.getAttribute('kind') || ''}`);
       request.upload.onprogress = (e) => this.say(`Reading ${file.name}, ${Math.floor(100 * e.loaded / e.total)} %`);
-      request.onload = () => done(request.status === 200 ? '' : request.status === 400 ? JSON.parse(request.responseText).error : refused);
+      request.onload = () => done(request.status === 200 ? '' : [400, 413].includes(request.status) ? JSON.parse(request.responseText).error : refused);
       request.onerror = () => done(refused);
       request.send(file);
     });

@@ -23,6 +23,7 @@ const wire = {
 
 const views = new Map(); // series -> what is looked at of it: the page is laid out anew where something changes
 const HINT = 'Drag to pan, wheel or + and - to zoom';
+const LEAST = { m: 1e-4, rad: 1e-4 }; // of what an axis shows, by its unit
 const TOP = 20, PANEL = 110, GAP = 24, BOTTOM = 38;
 const tall = (panels) => TOP + panels * (PANEL + GAP) - GAP + BOTTOM;
 
@@ -200,7 +201,8 @@ class Plot extends HTMLElement {
     for (const { n, numbers, at } of lines)
       for (let i = at; i < at + 2 * n; i++) { const v = numbers[i]; if (v < low) low = v; if (v > high) high = v; }
     if (!(low <= high)) { low = -1; high = 1; }
-    if (high - low < 1e-9) { low -= 0.5; high += 0.5; }
+    const least = LEAST[panel.unit] || 1e-3, more = (least - (high - low)) / 2; // what rests is no noise of 1e-6
+    if (more > 0) { low -= more; high += more; }
     const edge = Math.max((high - low) * 0.06, Math.abs(high) * 1e-3, 1e-9);
     low -= edge; high += edge;
     const y = (v) => top + PANEL - (v - low) / (high - low) * PANEL;

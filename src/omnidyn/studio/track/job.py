@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import omnidyn
+from omnidyn.control.drawn import least_smoothing, smoothed
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.polyline import path_of_file, through
 from omnidyn.control.readings import with_sensors
@@ -30,7 +31,8 @@ def track(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, An
     """What `omnidyn track` says of controllers on a path; writes their runs, the animation and series.
 
     request: "robot", "plant" ("" for the same), "path" (as `track` takes it), "file" (the name of one, where it is
-    one), "points", "speed" and "closed" of one drawn by hand, "controllers", "sensors", "folder" of the results.
+    one), "points", "speed", "closed" and "smoothing" ([s], None for what the robot needs) of one drawn by hand,
+    "controllers", "sensors", "folder" of the results.
     """
     with timed(tell) as listen:
         return _tracked(request, listen)
@@ -42,7 +44,7 @@ def _tracked(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     folder.mkdir(parents=True)
     listen(Report("reading"))
     plant = omnidyn.load_robot(request["plant"]) if request["plant"] else robot
-    sensors, path = request["sensors"] or None, _path(request, folder)
+    sensors, path = request["sensors"] or None, _path(request, folder, robot)
     trackings = omnidyn.track(robot, path, request["controllers"], plant=plant, sensors=sensors, progress=listen)
     listen(Report("drawing"))
     demand = omnidyn.path_demand(with_sensors(robot, sensors), path)
@@ -55,10 +57,12 @@ def _tracked(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
     return {**shown(document), "names": names, "drawn": bool(request["points"]), "series": [SERIES]}
 
 
-def _path(request: Mapping[str, Any], folder: FilePath) -> Path:
+def _path(request: Mapping[str, Any], folder: FilePath, robot: Robot) -> Path:
     """The path; one drawn by hand is written as a file first, which `omnidyn track` takes."""
     if request["points"]:
-        drawn = through(request["points"], request["speed"], request["closed"], DRAWN)
+        drawn, closed = through(request["points"], request["speed"], request["closed"], DRAWN), request["closed"]
+        width = request["smoothing"]
+        drawn = smoothed(drawn, least_smoothing(robot, drawn, closed=closed) if width is None else width, closed=closed)
         omnidyn.write_run(omnidyn.Run(t=drawn.t, pose=drawn.pose), folder / DRAWN)
         return replace(path_of_file(folder / DRAWN), name=DRAWN)
     if request["file"]:

@@ -28,6 +28,7 @@ class Tracks:
         self.path, self.options = next(iter(OPTIONS)), {name: dict[str, str]() for name in OPTIONS}
         self.points: list[Any] = []
         self.speed, self.closed = str(SPEED), False
+        self.smoothing: float | None = None  # [s]; None for as much as the robot needs
         self.controllers, self.sensors, self.plant = ["pid", "mpc"], "", ""
         self.path_files, self.controller_files = dict[str, str](), dict[str, str]()
         session.takers[TRACK] = self.add_file
@@ -111,6 +112,7 @@ class Tracks:
             "points": self.points if self.path == DRAWN else [],
             "speed": _number(self.speed),
             "closed": self.closed,
+            "smoothing": self.smoothing,
             "controllers": [self.controller_files.get(name, name) for name in self.controllers],
             "sensors": self.sensors.strip(),
         }

@@ -8,6 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
+from omnidyn.control.drawn import MOST
 from omnidyn.control.paths.path import OPTIONS
 from omnidyn.studio.elements import document, verdict
 from omnidyn.studio.page import Page
@@ -32,7 +33,7 @@ class TrackTab:
 
     def build(self) -> None:
         """Lay it out."""
-        self.page.part(self.page.robot_choice, ROBOT)
+        self.page.part(self.page.robot_choice, ROBOT, of=self.page.robots)
         self.page.part(self._path, PATH)
         self.page.part(self._loop, PATH, ROBOT)
         self.page.part(self._start, TRACK, TRACK_START, PATH, ROBOT)
@@ -75,6 +76,25 @@ class TrackTab:
                 value=tracks.closed,
                 on_change=lambda e: setattr(tracks, "closed", e.value),
             )
+        with ui.row().classes("line"):
+            words = ui.label().classes("text quiet").props("id=smoothing-words")
+
+            def smooth(value: float | None) -> None:
+                tracks.smoothing = value
+                said = "as much as the robot needs" if value is None else f"over {value:g} s" if value else "as drawn"
+                words.set_text(f"Corners are smoothed {said}." if value != 0.0 else "Corners stay as drawn.")
+                slider.set_enabled(value is not None)
+
+            ui.checkbox(
+                "smooth as the robot needs",
+                value=tracks.smoothing is None,
+                on_change=lambda e: smooth(None if e.value else slider.value),
+            )
+            slider = ui.slider(
+                min=0.0, max=MOST, step=0.05, value=tracks.smoothing or 0.2, on_change=lambda e: smooth(e.value)
+            )
+            slider.props("aria-label='seconds over which corners are smoothed'").classes("smoothing")
+            smooth(tracks.smoothing)
 
     def _loop(self) -> None:
         """The controllers, the sensors, and the robot that is driven in truth."""

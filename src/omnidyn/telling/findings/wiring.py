@@ -69,6 +69,11 @@ def _inverted(statement: Statement) -> str:
         return (
             f"{subject} has the opposite sign of what {SOURCES[n['source']]} says, while the other wheels agree with it"
         )
+    if "likeness" in n:
+        names = subject.split()
+        goes, has = by_number(names, "goes", "go"), by_number(names, "it has", "they have")
+        return f"{' and '.join(names)} {goes} the other way than the voltages drive the robot (likeness \
+{n['likeness']:.2f}): {has} the opposite sign, or the motors are in another order than in the robot file"
     return f"{subject} goes the other way than the wheels say ({n['ratio']:.3g} +-{n['error']:.2g} of it): it has the \
 opposite sign, or all wheels have"
 
@@ -129,7 +134,15 @@ OF_WHEELS = {
 SENTENCES = {
     "wiring": Sentence(_wiring),
     "swapped": Sentence(_wired, "", OF_WHEELS),
-    "inverted": Sentence(_inverted, _inverted_remedy, OF_WHEELS),
+    "inverted": Sentence(
+        _inverted,
+        _inverted_remedy,
+        {
+            **OF_WHEELS,
+            "drive": "set `invert` for that column in the mapping; where all logs show it, put the wheels of the robot "
+            "file in the order of the motors",
+        },
+    ),
     "marker_angle": Sentence(_marker_angle, "take the angle off: `assume` marker={angle_deg:.1f}deg"),
     "pose_frame": Sentence(
         _pose_frame,

@@ -1,0 +1,56 @@
+"""Axes of a twist against the voltages: simulated logs of random robots without any speed of a wheel."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.findings.check import check_log
+from omnidyn.findings.remedies import remedied
+from omnidyn.logs.read_log import LogOptions, recorded_log
+from omnidyn.statement import ERROR
+from tests.support.pages import write_log
+from tests.support.random_logs import AXES, plain, random_scene
+
+
+def recorded(seed):
+    """A clean log of voltages or duty and a twist, and its robot."""
+    draws = np.random.default_rng([seed, 77])
+    scene = replace(random_scene(draws), floor="twist", has_speed=False, has_current=False, seconds=15.0)
+    return plain(draws, scene), scene.robot
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_each_axis_that_is_turned_is_named_and_no_clean_log_is(seed):
+    log, robot = recorded(seed)
+    assert not [finding for finding in check_log(log, robot).findings if finding.code == "inverted"]
+    k = seed % 3
+    turned = log.channels["twist"] * np.where(np.arange(3) == k, -1.0, 1.0)
+    wrong = replace(log, channels={**log.channels, "twist": turned})
+    (found,) = (finding for finding in check_log(wrong, robot).findings if finding.severity == ERROR)
+    assert (found.code, found.subject) == ("inverted", AXES[k])
+    assert "the voltages drive" in str(found)
+    assert "in the mapping" in found.remedy_text
+
+
+def test_the_remedy_reads_the_log_with_the_other_sign(tmp_path):
+    def turn(twist):
+        twist[:, 1] *= -1.0
+
+    robot = omnidyn.load_robot("axebot")
+    right = recorded_log(write_log(tmp_path / "right.csv"), robot, LogOptions())
+    log = recorded_log(write_log(tmp_path / "log.csv", change=turn), robot, LogOptions())
+    (found,) = (finding for finding in check_log(log, robot).findings if finding.severity == ERROR)
+    mended = recorded_log(tmp_path / "log.csv", robot, remedied(found, LogOptions(), log.columns))
+    np.testing.assert_array_equal(mended.channels["twist"], right.channels["twist"])
+    assert not check_log(mended, robot).has_errors
+
+
+def test_an_axis_that_is_not_driven_says_nothing():
+    draws = np.random.default_rng(0)
+    voltage = np.repeat(draws.uniform(-5.0, 5.0, (60, 1)), 20, axis=0) * [0.0, 1.0, -1.0]
+    run = omnidyn.simulate(omnidyn.load_robot("axebot"), voltage, 0.01)
+    twist = run.twist + draws.standard_normal(run.twist.shape) * 0.01 - [0.0, 0.2, 0.0] * np.sign(run.twist[:, :1])
+    log = omnidyn.Run(t=run.t, voltage=run.voltage, twist=twist)
+    assert not [f for f in omnidyn.check(log, omnidyn.load_robot("axebot")).findings if f.code == "inverted"]

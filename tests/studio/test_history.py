@@ -1,0 +1,157 @@
+"""The history of fits, removals and undo, what a user may bring, and that no path of the server shows."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("nicegui", reason="the extra studio is not installed")
+
+import omnidyn
+from omnidyn.studio.compare.state import Comparing
+from omnidyn.studio.fit.state import Fitting
+from omnidyn.studio.session import MAX_FILES, RefusedError, Session
+from omnidyn.studio.task import Task
+from omnidyn.studio.words import each_text, in_page_names
+from tests.studio.test_calls import Here
+from tests.support.pages import write_log
+
+FOLDER = "a folder of the server"
+
+
+@pytest.fixture
+def session(tmp_path):
+    """A session whose jobs are done in this process."""
+    made = Session()
+    made.workers = dict.fromkeys(made.workers, Here())
+    made.start = lambda work: work.close()
+    made.robot = "axebot"
+    yield made
+    made._folder.cleanup()
+
+
+def kept(session, fitting, count=1):
+    """So many fits of the axebot."""
+    for _ in range(count):
+        folder = session.new_folder()
+        omnidyn.save_robot(omnidyn.load_robot("axebot"), folder / "robot.toml")
+        fitting.last = Task(result={"verdict": "Good.", "failed": False}, folder=folder)
+        fitting.keep(fitting.last)
+
+
+def test_fits_are_kept_named_noted_and_shown_again(session):
+    fitting = Fitting(session)
+    kept(session, fitting, 2)
+    first, second = fitting.history.values()
+    assert [omnidyn.load_robot(session.robots[name]).name for name in fitting.history] == [
+        "axebot, fit-1",
+        "axebot, fit-2",
+    ]  # told apart where both are compared
+    fitting.show("fit-1.toml")
+    assert fitting.last is first
+    fitting.note("fit-1.toml", "the old floor")
+    session.choose("fit-1.toml")
+    assert fitting.rename("fit-1.toml", "carpet") == ""
+    assert list(fitting.history) == ["fit-2.toml", "carpet.toml"]
+    assert (session.robot, Path(session.robot_path).name) == ("carpet.toml", "carpet.toml")
+    assert fitting.notes["carpet.toml"] == "the old floor"
+    assert "there is a robot of this name" in fitting.rename("carpet.toml", "fit-2")
+    assert asyncio.run(session.keep_robot("", "carpet", "carpet.toml")) != ""  # a fit is not written over
+    fitting.remove("carpet.toml")
+    assert list(fitting.history) == ["fit-2.toml"]
+    assert session.robot == ""
+    session.undo()
+    assert fitting.history["carpet.toml"] is first
+    assert session.robot == "carpet.toml"
+    assert fitting.history["fit-2.toml"] is second
+
+
+def test_a_log_that_was_removed_comes_back_and_its_file_goes_with_the_next_removal(session, tmp_path):
+    paths = [session.new_folder() / name for name in ("a.csv", "b.csv")]
+    logs = [session.add_log(str(write_log(path, 1.0)), path.name) for path in paths]
+    session.remove(logs[0])
+    assert list(session.logs.values()) == [logs[1]]
+    session.undo()
+    assert session.removed is None
+    assert {log.name for log in session.logs.values()} == {"a.csv", "b.csv"}
+    session.remove(logs[0])
+    assert paths[0].exists()
+    session.remove(logs[1])
+    assert not paths[0].exists()
+    assert paths[1].exists()
+
+
+def test_only_what_a_user_brought_counts_and_that_is_said(session, tmp_path):
+    fitting = Fitting(session)
+    kept(session, fitting, 3)
+    asyncio.run(session.example())
+    assert session.room == f"0 of at most {MAX_FILES} files, 1 GiB each."
+
+    async def body():
+        yield b"t_s,vx_m_s\n0,1\n"
+
+    for k in range(MAX_FILES):
+        asyncio.run(session.upload(f"{k}.csv", body()))
+    assert session.room == f"{MAX_FILES} of at most {MAX_FILES} files, 1 GiB each. Remove one first."
+    with pytest.raises(RefusedError, match="Remove one first"):
+        asyncio.run(session.upload("one-more.csv", body()))
+
+
+def test_no_path_of_the_server_stands_in_what_is_said_or_written(session, tmp_path):
+    folder = tmp_path / FOLDER
+    folder.mkdir()
+    robot_file, paths = folder / "mine.toml", [folder / "one.csv", folder / "two.csv"]
+    omnidyn.save_robot(omnidyn.load_robot("axebot"), robot_file)
+
+    def turn(twist):
+        twist[:, 1] *= -1.0
+
+    write_log(paths[0], 8.0)
+    write_log(paths[1], 8.0, 2, change=turn)
+    session.open([str(robot_file), *map(str, paths)])
+    assert session.robot == "mine.toml"
+    said = []
+    for log in session.logs.values():
+        asyncio.run(session.check(log))
+        said += [log.result, log.error]
+    fitting, comparing = Fitting(session), Comparing(session)
+    (finding,) = (f for f in list(session.logs.values())[1].result["findings"] if f["severity"] == "error")
+    assert finding["reading"]
+    assert fitting.why_not()[0] == "unfit"
+    asyncio.run(session.remedy(list(session.logs.values())[1], finding["reading"]))
+    fitting.hold_out([list(session.logs)[1]])
+    assert fitting.why_not() == ("", "")
+    asyncio.run(fitting.run())
+    assert not fitting.last.result["failed"]
+    asyncio.run(comparing.run())
+    said += [fitting.last.result, comparing.last.result]
+    first, second = session.logs.values()
+    first.other = second.key
+    asyncio.run(session.align(first))
+    said.append(first.aligned)
+    assert FOLDER not in str(said)
+    assert str(session.folder) not in str(said)
+    for file in fitting.last.folder.rglob("*"):
+        if file.suffix in (".toml", ".csv", ".json", ".html") and file.name != "report.html":
+            text = file.read_text("utf-8")
+            assert FOLDER not in text, file
+            assert str(session.folder) not in text, file
+    assert str(session.folder) not in (fitting.last.folder / "report.html").read_text("utf-8")
+    kept_robot = omnidyn.load_robot(fitting.last.folder / "robot.toml")
+    assert "one.csv" in str({key: prior.source for key, prior in kept_robot.priors.items()})
+    rows = {row[0]: row[1:] for row in fitting.last.result["logs"]["rows"]}
+    assert {name: row[0] for name, row in rows.items()} == {"two.csv": "hold out", "one.csv": "fit"}
+    of_one = omnidyn.compare(kept_robot, omnidyn.read_log(paths[0], kept_robot)).rmse
+    assert [float(cell) for cell in rows["one.csv"][1:]] == pytest.approx([*of_one.values()], rel=0.01)
+    assert list(fitting.last.result["runs"]) == ["two.csv (hold out)", "one.csv (fit)"]
+
+
+def test_the_words_of_the_library_have_the_names_of_the_page():
+    said = "hold out a log with `hold_out`, see `check`; raise `max_bytes`"
+    assert in_page_names(said) == "hold out a log with hold out (tab Fit), see check; raise --max-bytes"
+    told = each_text({"text": said, "columns": [{"column": "`hold_out`"}]}, in_page_names)
+    assert told["columns"] == [{"column": "`hold_out`"}]
+    assert "`" not in told["text"]
+    assert in_page_names("latency.twist is 0; twist[1] is not followed") == (
+        "latency of the speed over the ground is 0; vy is not followed"
+    )
