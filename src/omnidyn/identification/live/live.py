@@ -26,8 +26,8 @@ RESISTANCE = "motor.resistance_ohm"
 EVERY = 1.0  # [s] of the log between two answers
 STRETCH = 5.0  # [s] whose rows are predicted before they count
 FIRST = 4.0  # [s] of the log before the first fit
-GROWTH, SOONER = 2.0, 1.25  # times as much log at which all is fitted anew; the same where that seems to be needed
-MOVED = 0.5  # standard errors that a number may move before all is fitted anew
+GROWTH, SOONER = 1.6, 1.15  # times as much log at which all is fitted anew; where that seems to be needed
+MOVED = 0.2  # standard errors that a number of a long log may move before all rows are taken anew
 FIT_ROWS = 8_000  # rows of a whole fit: with so many, the noise is known
 MOST_ROWS = 60_000  # rows that are kept; what older ones said stays in the sums
 WIDEST = 0.1  # half an interval as a share of its number, by default
@@ -137,23 +137,23 @@ class Live:
         if self._model is None:
             if now - self._start >= self._next_try:
                 self._fit(now)
+                self._was_reached = self._model is not None and self._is_reached()
             return
         model = self._model
         model.take(self._rows, now)
-        unpredicted = False
-        if now - model.start >= STRETCH:
-            self._held_out = model.judge(now)
-            unpredicted = bool(self._held_out.missed)
-            if self._enough_at is None and self._was_reached and self._held_out.predicted and self._is_reached():
-                self._enough_at = now - self._start
-            model.close(now)
-            self._was_reached = self._is_reached()
-        grown = (now - self._start) / max(model.fitted_at - self._start, EVERY)
-        has_doubled = now - self._start >= GROWTH * (self._fitted_at - self._start)
-        if (unpredicted and grown >= SOONER) or (has_doubled and self._fitted_rows < FIT_ROWS):
+        if now - model.start < STRETCH:
+            return
+        self._held_out = model.judge(now)
+        if self._enough_at is None and self._was_reached and self._held_out.predicted and self._is_reached():
+            self._enough_at = now - self._start
+        model.close(now)
+        age, is_small = now - self._start, self._rows.count <= FIT_ROWS
+        has_grown = age >= GROWTH * (self._fitted_at - self._start) and self._fitted_rows < FIT_ROWS
+        if has_grown or (self._held_out.missed and age >= SOONER * (self._fitted_at - self._start)):
             self._fit(now)
-        elif grown >= GROWTH or (grown >= SOONER and model.moved > MOVED):
+        elif is_small or (model.moved > MOVED and age >= SOONER * (model.fitted_at - self._start)):
             model.linearise(self._rows, now)
+        self._was_reached = self._is_reached()
         if self._rows.count > MOST_ROWS:
             self._model.freeze()
             self._rows.forget(self._model.start - STRETCH)
@@ -173,7 +173,6 @@ class Live:
         if len(last) < len(run) or model.past is not None:
             model.linearise(self._rows, now)
         self._model, self._fitted_rows, self._fitted_at = model, len(last), now
-        self._was_reached = self._is_reached()
 
     def _is_reached(self) -> bool:
         return all(number.is_reached for number in self._numbers().values())

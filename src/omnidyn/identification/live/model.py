@@ -35,7 +35,7 @@ from omnidyn.run import Run
 from omnidyn.statistics import difference_noise
 
 ROUNDS, START_ROUNDS = 3, 3  # of numbers and noise in turn; until it is known where a stretch begins
-NEAR = 0.1  # standard errors: a change of the numbers that is none
+LINEAR_STEPS = 4  # of the fit's solver, when all rows that are kept are taken anew
 RECENT = 3  # stretches that are compared with a fit before
 SIGNAL = 3.0  # times its noise, that an output must vary by in a stretch that judges
 CHANCE = 5.0  # standard errors of a mean square that noise alone does not reach
@@ -139,16 +139,14 @@ class Model:
         if made is None:
             return
         solver = self._solver_of(made)
-        sums = self._empty()
-        for _ in range(ROUNDS):
-            state = self._state_at(solver, Point(self.values, made.start().states))
-            sums = Quadratic.of(solver, state, self.problem.columns)
-            self.sums, self.open = sums, self._empty()
-            before = self.values
-            self._settle()
-            std = np.where(np.isfinite(self.uncertainty.std), self.uncertainty.std, np.inf)
-            if (np.abs(self._solver.inner(before) - self.inner) <= NEAR * std).all():
-                break
+        start = self._state_at(solver, Point(self.values, made.start().states))
+        if self.past is None:  # else the rows alone say less than all that was
+            scales = start.variance if solver.scaled.any() else None
+            found = solver.minimise(start.point, LINEAR_STEPS, scales=scales).state
+            self.values = found.point.values
+            start = self._state_at(solver, found.point, 1)
+        self.sums, self.open = Quadratic.of(solver, start, self.problem.columns), self._empty()
+        self._settle()
         self.fitted_at, self.linear_at, self.start = end, self.values, end
         self._begin()
 
