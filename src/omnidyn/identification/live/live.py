@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +26,7 @@ RESISTANCE = "motor.resistance_ohm"
 EVERY = 1.0  # [s] of the log between two answers
 STRETCH = 5.0  # [s] whose rows are predicted before they count
 FIRST = 4.0  # [s] of the log before the first fit
-GROWTH, SOONER = 1.6, 1.15  # times as much log at which all is fitted anew; where that seems to be needed
+GROWTH, SOONER = 2.0, 1.15  # times as much log at which all is fitted anew; where that seems to be needed
 MOVED = 0.2  # standard errors that a number of a long log may move before all rows are taken anew
 FIT_ROWS = 8_000  # rows of a whole fit: with so many, the noise is known
 MOST_ROWS = 60_000  # rows that are kept; what older ones said stays in the sums
@@ -105,6 +105,12 @@ class Live:
 
         Raises InputError for rows of another robot.
         """
+        for _ in self.answers(run):
+            pass
+        return self._status
+
+    def answers(self, run: Run) -> Iterator[LiveStatus]:
+        """Take more rows: the answer of each second of them. Raises InputError as `add` does."""
         check_order("add(run)", (run, (Run,)))
         if run.wheels is not None and run.wheels != self.robot.wheels.count:
             raise InputError(
@@ -115,7 +121,7 @@ class Live:
                 where=run.source,
             )
         if not len(run):
-            return self._status
+            return
         before, shifted = self._rows.last, self._rows.on_clock(run)
         gaps = np.diff(shifted.t, prepend=before if math.isfinite(before) else shifted.t[0])
         self._gap = max(self._gap, float(gaps.max()) if gaps.max() > LONGEST_GAP else 0.0)
@@ -131,7 +137,7 @@ class Live:
                 self._answered = self._rows.last
                 self._update(self._answered)
                 self._status = self._answer()
-        return self._status
+                yield self._status
 
     def _update(self, now: float) -> None:
         if self._model is None:
