@@ -93,6 +93,7 @@ class Model:
         known = np.isfinite(plain) & np.isfinite(whole) & (plain > 0.0)
         self._factor = np.where(known, whole / np.where(known, plain, 1.0), 1.0)
         self.uncertainty = self._trust()
+        self._open = self.uncertainty.open
         self._begin()
 
     def take(self, rows: Rows, end: float) -> None:
@@ -147,7 +148,7 @@ class Model:
             start = self._state_at(solver, found.point, 1)
         self.sums, self.open = Quadratic.of(solver, start, self.problem.columns), self._empty()
         self._settle()
-        self.fitted_at, self.linear_at, self.start = end, self.values, end
+        self.fitted_at, self.linear_at, self.start, self._open = end, self.values, end, self.uncertainty.open
         self._begin()
 
     @property
@@ -253,8 +254,11 @@ class Model:
 
     @property
     def unknown(self) -> BoolArray:
-        """Which numbers the rows leave open, shape (P,)."""
-        return self.uncertainty.open
+        """Which numbers the rows leave open, shape (P,).
+
+        One that rows about one point leave open stays so: sums of slopes at two points seem to tell it.
+        """
+        return self.uncertainty.open | self._open
 
     def _settle(self) -> None:
         total = self.sums.plus(self.open)
