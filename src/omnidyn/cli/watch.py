@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import select
 import socket
 import sys
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 STDIN, UDP = "-", "udp:"
 PAUSE = 0.1  # [s] between two looks at a source
-MOST_BYTES = 1 << 20  # read at once
+MOST_BYTES, TAIL = 1 << 20, 256  # read at once; kept, to know a file again
 
 
 @reads_logs("sort", "rate", "var", "skip_bad_rows", "latency")
@@ -112,11 +111,10 @@ def _texts(source: str, idle: float) -> Iterator[str | None]:
     `idle` seconds of silence."""
     last = time.monotonic()
     for data in _bytes(source):
-        if data:
-            last = time.monotonic()
-        elif idle and time.monotonic() - last > idle:
+        if data == b"" and idle and time.monotonic() - last > idle:
             return
         yield data if data is None else data.decode("utf-8", errors="replace")
+        last = last if data == b"" else time.monotonic()  # what was done with it is no silence
 
 
 def _bytes(source: str) -> Iterator[bytes | None]:
@@ -132,7 +130,7 @@ def _of_stdin() -> Iterator[bytes]:
 
 
 def _of_file(path: str) -> Iterator[bytes | None]:
-    """What a file grows by; one that is shorter than before, or another one of its name, is read from its start."""
+    """What a file grows by; one that no longer ends as it did where it was read to is read from its start."""
     with open_regular(path):
         pass
     kind = format_of(path)
@@ -144,19 +142,20 @@ def _of_file(path: str) -> Iterator[bytes | None]:
             remedy="fit the whole file with identify, or let the logger write text too",
             where=path,
         )
-    place, node = 0, os.stat(path).st_ino
+    place, before = 0, b""  # how far it was read, and the last bytes there
     while True:
         try:
-            found = os.stat(path)
-            if found.st_size < place or found.st_ino != node:
-                place, node = 0, found.st_ino
-                yield None
             with open(path, "rb") as file:
-                file.seek(place)
-                data = file.read(MOST_BYTES)
+                file.seek(place - len(before))
+                is_same = file.read(len(before)) == before
+                data = file.read(MOST_BYTES) if is_same else b""
         except OSError:  # between two files of one name
-            data = b""
-        place += len(data)
+            is_same, data = True, b""
+        if not is_same:
+            place, before = 0, b""
+            yield None
+            continue
+        place, before = place + len(data), (before + data)[-TAIL:]
         yield data
         if not data:
             time.sleep(PAUSE)

@@ -83,7 +83,7 @@ class Live:
         self._rows, self._model = Rows(), None
         self._start = self._answered = math.nan
         self._fitted_rows, self._fitted_at = 0, 0.0
-        self._next_try, self._gap, self._waiting = FIRST, 0.0, "no rows yet"
+        self._next_try, self._gap, self._waiting = FIRST, 0.0, f"the first fit takes {FIRST:g} s of rows"
         self._was_reached, self._enough_at, self._held_out = False, None, None
         self._model: Model | None
         self._enough_at: float | None
