@@ -276,7 +276,9 @@ def _ordinary(table: Table) -> None:
             "false enough %": 100.0 * far_off / max(len(held), 1),
         },
     )  # fmt: skip
-    table.notes.append("four wheels: of 30 s, by benchmarks/ten_robots/world.py; what a guess leaves unknown is not counted")
+    table.notes.append(
+        "four wheels: of 30 s, by benchmarks/ten_robots/world.py; what a guess leaves unknown is not counted"
+    )
 
 
 def fast(kind: str, robot: omnidyn.Robot, seconds: float = 120.0) -> float:
@@ -288,4 +290,3 @@ def fast(kind: str, robot: omnidyn.Robot, seconds: float = 120.0) -> float:
         for first in range(0, len(log), 100):
             live.add(part(log, first, min(first + 100, len(log))))
         return 100.0 * (time.process_time() - begun) / seconds
-

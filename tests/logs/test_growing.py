@@ -35,7 +35,9 @@ def test_half_lines_headers_and_words_are_left_out_and_counted(table):
     rows[130] = HEAD
     rows[140] = "Guru meditation\n"
     runs = table.feed(HEAD + "".join(rows)) + table.feed("1.60,1.0,")
-    assert len(joined(runs)) == 147 and table.bad_rows == 2 and table.end() == []
+    assert len(joined(runs)) == 147
+    assert table.bad_rows == 2
+    assert table.end() == []
 
 
 def test_a_clock_that_begins_anew_begins_a_run_of_its_own(table):
@@ -43,7 +45,8 @@ def test_a_clock_that_begins_anew_begins_a_run_of_its_own(table):
     live = omnidyn.Live(table.robot)
     for run in [*runs, *table.feed("".join(map(row, range(120))))]:
         live.add(run)
-    assert live._rows.total == 270 and live._rows.last > 2.6
+    assert live._rows.total == 270
+    assert live._rows.last > 2.6
 
 
 def test_headings_go_on_over_whole_turns(table):
@@ -57,5 +60,5 @@ def test_headings_go_on_over_whole_turns(table):
 def test_what_is_no_table_is_refused(table):
     with pytest.raises(omnidyn.OmnidynError, match=r"log\.csv"):
         table.feed("hello\n" * (FIRST_ROWS + 5))
-    with pytest.raises(omnidyn.OmnidynError, match="a line does not end; got .*; expected rows of text"):
+    with pytest.raises(omnidyn.OmnidynError, match=r"a line does not end; got .*; expected rows of text"):
         GrowingTable("pipe").feed("1" * (2 << 20))

@@ -184,5 +184,3 @@ def _of_socket(source: str) -> Iterator[bytes]:
 def _refuse_range(option: str, value: float, unit: str) -> None:
     if not 0.0 < value < 1e6:
         raise InputError("out of range", got=f"{value:g}", expected=f"above 0 {unit}", where=option)
-
-

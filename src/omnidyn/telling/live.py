@@ -37,7 +37,9 @@ SENTENCES = {
     "live_waiting": Sentence("no numbers yet after {seconds:.0f} s: {why}"),
     "live_not_yet": Sentence(_not_yet),
     "live_not_predicted": Sentence(_not_predicted, "drive on; where it stays so, fit the log with identify"),
-    "live_enough": Sentence("enough: after {at:.0f} s all numbers are known, and a stretch that was held out was predicted"),
+    "live_enough": Sentence(
+        "enough: after {at:.0f} s all numbers are known, and a stretch that was held out was predicted"
+    ),
     "live_changed": Sentence(_changed, "stop, and look; drive a new log where the change is meant to stay"),
     "live_restarts": Sentence("time began anew {restarts} times: what followed counts on"),
     "live_gap": Sentence("rows are missing for up to {gap:.1f} s: the motion in them is not used"),

@@ -90,10 +90,13 @@ def test_enough_needs_intervals_and_a_stretch_that_was_predicted(log):
         status = live.add(part(log, first, first + 100))
         if at is None and status.is_enough:
             at = status
-    assert at is not None and at.held_out.predicted and not at.missing
+    assert at is not None
+    assert at.held_out.predicted
+    assert not at.missing
     assert at.held_out.end - at.held_out.start == pytest.approx(5.0, abs=0.05)
     strict = fed(log, omnidyn.Live(WRONG, within=1e-3)).status
-    assert not strict.is_enough and strict.verdict.code == "live_not_yet"
+    assert not strict.is_enough
+    assert strict.verdict.code == "live_not_yet"
 
 
 def test_numbers_that_do_not_predict_are_not_enough(exact):
@@ -107,7 +110,9 @@ def test_numbers_that_do_not_predict_are_not_enough(exact):
 
 
 def test_the_floor_that_changed_is_said():
-    fit = omnidyn.identify(noisy(omnidyn.simulate(ROBOT, voltages(np.random.default_rng(5)), 0.01), 5), ROBOT, quick=True)
+    fit = omnidyn.identify(
+        noisy(omnidyn.simulate(ROBOT, voltages(np.random.default_rng(5)), 0.01), 5), ROBOT, quick=True
+    )
     reference = next(iter(fit.groups.values())).robot
     rough = with_friction(ROBOT, [0.94, 0.96, 0.01, 1.5 * 2.2, 1.5 * 1.5, 1.5 * 0.099])
     heavy = ROBOT.replace(body=ROBOT.body.replace(mass=2.5, inertia=0.045))
@@ -123,7 +128,8 @@ def test_a_robot_at_rest_has_no_numbers_and_says_why():
     t = np.arange(800) / 100.0
     run = omnidyn.Run(t=t, voltage=np.zeros((800, 3)), twist=np.random.default_rng(0).normal(size=(800, 3)) * NOISE)
     status = fed(run).status
-    assert not status.numbers and "never visibly moved" in status.waiting
+    assert not status.numbers
+    assert "never visibly moved" in status.waiting
     assert "no numbers yet after 7 s" in str(status.verdict)
 
 
@@ -138,7 +144,8 @@ def test_gaps_restarts_and_missing_values_are_survived_and_said(log, live):
     last = part(later, 800, len(later))
     fed(last.replace(t=last.t - last.t[0]), other)  # the logger begins anew
     status = other.status
-    assert status.restarts == 1 and status.gap > 1.0
+    assert status.restarts == 1
+    assert status.gap > 1.0
     assert {statement.code for statement in status.statements()} == {"live_restarts", "live_gap"}
     for name in BOX:
         assert abs(status.numbers[name].value - live.status.numbers[name].value) < 3.0 * live.status.numbers[name].std
@@ -162,9 +169,12 @@ def test_rows_keep_time_and_join_channels():
         rows.add(rows.on_clock(run))
     run = rows.between(-np.inf, np.inf)
     assert run.t.tolist() == pytest.approx([0.0, 0.1, 2.1, 2.2])
-    assert np.isnan(run.twist[2:]).all() and np.isnan(run.voltage[:2]).all() and rows.restarts == 1
+    assert np.isnan(run.twist[2:]).all()
+    assert np.isnan(run.voltage[:2]).all()
+    assert rows.restarts == 1
     rows.forget(2.0)
-    assert rows.count == 2 and rows.total == 4
+    assert rows.count == 2
+    assert rows.total == 4
 
 
 def test_what_cannot_be_used_is_refused():
@@ -172,5 +182,5 @@ def test_what_cannot_be_used_is_refused():
         omnidyn.Live(ROBOT).add(omnidyn.Run(t=[0.0, 0.1], voltage=np.zeros((2, 4)), twist=np.zeros((2, 3))))
     with pytest.raises(omnidyn.OmnidynError, match="got -1; expected a share above 0"):
         omnidyn.Live(ROBOT, within=-1)
-    with pytest.raises(omnidyn.OmnidynError, match="speed loop.*expected drive kind voltage or duty"):
+    with pytest.raises(omnidyn.OmnidynError, match=r"speed loop.*expected drive kind voltage or duty"):
         omnidyn.Live(omnidyn.load_robot("robotino"))

@@ -44,7 +44,9 @@ def test_a_last_row_without_inputs_says_nothing_of_a_latency(axebot, clean):
     log = noisy(clean, 2)
     voltage = log.voltage.copy()
     voltage[-1] = np.nan
-    assert holds(identify(log.replace(voltage=voltage), axebot, OutputError(nuisances=("latency",)), quick=True).estimate)
+    assert holds(
+        identify(log.replace(voltage=voltage), axebot, OutputError(nuisances=("latency",)), quick=True).estimate
+    )
 
 
 def test_rows_without_input_split_the_log_too(axebot, clean):

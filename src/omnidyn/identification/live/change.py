@@ -34,7 +34,10 @@ def changes(model: Model, reference: Robot) -> tuple[Statement, ...]:
         if before <= 0.0 or not np.isfinite(covariance[j, j]):
             continue
         before_std = 0.0 if prior is None or prior.std is None else prior.std / parameter.slope(before)
-        difference, std = float(inner[j]) - parameter.inner(before), float(np.hypot(np.sqrt(covariance[j, j]), before_std))
+        difference, std = (
+            float(inner[j]) - parameter.inner(before),
+            float(np.hypot(np.sqrt(covariance[j, j]), before_std)),
+        )
         share = parameter.outer(float(inner[j])) / before - 1.0
         if abs(difference) > ERRORS * std and abs(share) > SHARE:
             changed[parameter.name] = share

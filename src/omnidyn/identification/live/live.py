@@ -202,9 +202,14 @@ class Live:
         )  # fmt: skip
         if self._model is None:
             return status
-        told = () if self.reference is None else changes(self._model, self.reference)
+        changed = () if self.reference is None else changes(self._model, self.reference)
         return replace(
-            status, numbers=self._numbers(), held_out=self._held_out, enough_at=self._enough_at, changes=told, waiting=""
+            status,
+            numbers=self._numbers(),
+            held_out=self._held_out,
+            enough_at=self._enough_at,
+            changes=changed,
+            waiting="",
         )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.live.quadratic import Quadratic, QuadraticEngine
+from omnidyn.identification.live.quadratic import Quadratic, put, summing_solver
 from omnidyn.identification.live.rows import Rows
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.conclusion import intervals
@@ -86,12 +86,11 @@ class Model:
         self.open = self._empty()
         self.recent: deque[Quadratic] = deque(maxlen=RECENT)
         self._engine = solver.engine
-        self._summing = QuadraticEngine(self.problem, self.sums)
-        self._solver = Solver(self._summing.problem, self._summing, counts_ticks=False)
+        self._solver = summing_solver(self.problem, self.sums)
         self._factor, self._quantile = np.ones(len(self.values)), weighed.uncertainty.quantile
         plain, whole = self._trust().std, weighed.uncertainty.std
-        known = np.isfinite(plain) & np.isfinite(whole) & (plain > 0.0)
-        self._factor = np.where(known, whole / np.where(known, plain, 1.0), 1.0)
+        is_seen = np.isfinite(plain) & np.isfinite(whole) & (plain > 0.0)
+        self._factor = np.where(is_seen, whole / np.where(is_seen, plain, 1.0), 1.0)
         self.uncertainty = self._trust()
         self._open = self.uncertainty.open
         self._begin()
@@ -199,35 +198,37 @@ class Model:
 
     def _state_at(self, solver: Solver[Problem], point: Point, rounds: int = START_ROUNDS) -> State:
         """The state at the numbers of a point, where the pieces begin found in some rounds."""
-        known = dict(zip(self.problem.columns, self.variance, strict=True))
-        variance = np.array([known.get(column, 1.0) for column in solver.problem.columns])
+        noise = dict(zip(self.problem.columns, self.variance, strict=True))
+        variance = np.array([noise.get(column, 1.0) for column in solver.problem.columns])
         still, none = np.ones(len(point.values), bool), np.zeros(len(point.values))
-        for left in range(rounds, 0, -1):
+
+        def at(point: Point) -> State:
             sums = solver.engine.sums(point, Weighting(variance, counts_ticks=bool(self.counted.any())))
-            state = State(point, sums, 0.0, variance, solver.problem)
-            if left > 1:
-                states = Normal(solver, state).moved(0.0, still, np.diag(none), none).states
-                point = Point(point.values, states)
+            return State(point, sums, 0.0, variance, solver.problem)
+
+        state = at(point)
+        for _ in range(rounds - 1):
+            state = at(Point(point.values, Normal(solver, state).moved(0.0, still, np.diag(none), none).states))
         return state
 
     def _renamed(self, quadratic: Quadratic, before: Model) -> Quadratic:
         """A quadratic of another model in the numbers of this one; one that is new has not shown there."""
         names = before.problem.names
         at = [names.index(name) if name in names else -1 for name in self.problem.names]
-        known = np.array(at) >= 0
-        values = np.where(known, quadratic.values[at], self.values)
+        is_old = np.array(at) >= 0
+        values = np.where(is_old, quadratic.values[at], self.values)
         made = Quadratic.empty(self.problem.columns, values)
         for c, column in enumerate(self.problem.columns):
             if column in quadratic.columns:
                 k = quadratic.columns.index(column)
                 made.number[c], made.square[c] = quadratic.number[k], quadratic.square[k]
-                made.gradient[c] = np.where(known, quadratic.gradient[k][at], 0.0)
-                made.information[c] = quadratic.information[k][np.ix_(at, at)] * np.outer(known, known)
+                made.gradient[c] = np.where(is_old, quadratic.gradient[k][at], 0.0)
+                made.information[c] = quadratic.information[k][np.ix_(at, at)] * np.outer(is_old, is_old)
         return made
 
     def of_sums(self, sums: Quadratic) -> tuple[FloatArray, FloatArray]:
         """(inner values, their covariance) that sums alone say; infinite where they do not tell."""
-        self._summing.quadratic = sums
+        put(self._solver, sums)
         state = self._state(self.values)
         normal = Normal(self._solver, state)
         found = trust(self._solver, Solution(state, normal.held, 0, True, self._solver), WHITE)
@@ -245,8 +246,8 @@ class Model:
         """How far the numbers have moved since all was fitted, in standard errors: that of the one that has most."""
         std = self.uncertainty.std
         change = np.abs(self.inner - self._solver.inner(self.linear_at))
-        known = np.isfinite(std) & (std > 0.0)
-        return float((change[known] / std[known]).max(initial=0.0))
+        is_seen = np.isfinite(std) & (std > 0.0)
+        return float((change[is_seen] / std[is_seen]).max(initial=0.0))
 
     def intervals(self) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
         """Standard errors and 95 % intervals of all numbers, by name."""
@@ -262,7 +263,7 @@ class Model:
 
     def _settle(self) -> None:
         total = self.sums.plus(self.open)
-        self._summing.quadratic = total if self.past is None else total.plus(self.past)
+        put(self._solver, total if self.past is None else total.plus(self.past))
         count = len(self.values)
         for _ in range(ROUNDS):
             state = self._state(self.values)
@@ -310,5 +311,5 @@ def _after(piece: Piece, start: float) -> Piece | None:
 
 def _varies(values: FloatArray) -> bool:
     """Whether a column shows more than its noise."""
-    known = values[np.isfinite(values)]
-    return len(known) > 10 and bool(np.std(known) > SIGNAL * difference_noise(known))
+    finite = values[np.isfinite(values)]
+    return len(finite) > 10 and bool(np.std(finite) > SIGNAL * difference_noise(finite))

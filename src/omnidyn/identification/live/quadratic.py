@@ -104,3 +104,15 @@ class QuadraticEngine(FitEngine[Problem]):
                 np.zeros((1, width)), None,
             )
         ]  # fmt: skip
+
+
+def summing_solver(problem: Problem, quadratic: Quadratic) -> Solver[Problem]:
+    """The fit's solver on a quadratic in the place of rows."""
+    engine = QuadraticEngine(problem, quadratic)
+    return Solver(engine.problem, engine, counts_ticks=False)
+
+
+def put(solver: Solver[Problem], quadratic: Quadratic) -> None:
+    """Let a `summing_solver` go on with another quadratic."""
+    assert isinstance(solver.engine, QuadraticEngine)
+    solver.engine.quadratic = quadratic

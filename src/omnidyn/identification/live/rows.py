@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -73,7 +73,7 @@ def joined(runs: Sequence[Run]) -> Run:
         return runs[0]
     shapes = {name: value.shape[1:] for run in runs for name, value in run.channels.items()}
     channels = {name: np.concatenate([_of(run, name, shape) for run in runs]) for name, shape in shapes.items()}
-    return Run(t=np.concatenate([run.t for run in runs]), source=runs[0].source, **channels)
+    return replace(Run(t=np.concatenate([run.t for run in runs]), source=runs[0].source), **channels)
 
 
 def _of(run: Run, name: str, shape: tuple[int, ...]) -> FloatArray:

@@ -132,7 +132,9 @@ class LiveStatus(Displayable):
                 "rows": self.rows,
                 "enough": self.is_enough,
                 "enough_at_s": self.enough_at,
-                "numbers": {name: vars(number) | {"reached": number.is_reached} for name, number in self.numbers.items()},
+                "numbers": {
+                    name: vars(number) | {"reached": number.is_reached} for name, number in self.numbers.items()
+                },
                 "missing": list(self.missing),
                 "unknown": list(self.unknown),
                 "held_out": None
