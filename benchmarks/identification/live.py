@@ -210,6 +210,8 @@ def measure() -> Table:
                     if is_done and name not in done:
                         done.add(name)
                         rival_stops[name].append((rows / RATE, is_far))
+                if len(done) == len(rival_stops):
+                    break
         held_total += end
         lowest = 92.0 if WHOLE else 80.0
         shares = [100.0 * float(np.mean(x)) if x else None for x in (end, stop, near, false)]

@@ -1,6 +1,5 @@
 """omnidyn watch: a file that grows, standard input, a socket; and what it does not take."""
 
-import io
 import json
 import socket
 import threading
@@ -54,10 +53,11 @@ def test_a_file_that_grows_and_is_written_anew(call, here, lines, monkeypatch):
     assert "Coulomb friction forward" in out
 
 
-def test_standard_input_gives_a_line_of_json_each_second(call, monkeypatch, lines):
-    stream = io.TextIOWrapper(io.BytesIO("".join(lines).encode()))
-    monkeypatch.setattr("sys.stdin", stream)
-    code, out, err = call("watch", "-", "--robot", "axebot", "--json", "--within", "1")
+def test_standard_input_gives_a_line_of_json_each_second(call, here, monkeypatch, lines):
+    (here / "rows").write_text("".join(lines))
+    with (here / "rows").open() as stream:
+        monkeypatch.setattr("sys.stdin", stream)
+        code, out, err = call("watch", "-", "--robot", "axebot", "--json", "--within", "1")
     answers = [json.loads(line) for line in out.splitlines()]
     assert [round(answer["seconds"]) for answer in answers] == list(range(1, 21))
     number = answers[-1]["numbers"]["friction.axes.coulomb[0]"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import select
 import socket
 import sys
@@ -124,8 +125,8 @@ def _bytes(source: str) -> Iterator[bytes | None]:
 
 
 def _of_stdin() -> Iterator[bytes]:
-    stream = sys.stdin.buffer
-    while data := stream.read1(MOST_BYTES):
+    number = sys.stdin.fileno()
+    while data := os.read(number, MOST_BYTES):
         yield data
 
 
