@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from omnidyn.identification.live.model import Model
+from omnidyn.identification.live.model import LiveModel
 from omnidyn.identification.output_error.conclusion import prior_of
 from omnidyn.model.keys import BREAKAWAY, COULOMB, Key
 from omnidyn.model.robot import Robot
@@ -21,7 +21,7 @@ MASSES = ("body.mass_kg", "body.inertia_kg_m2")
 FLOOR, PAYLOAD, WEAR = "floor", "payload", "wear"
 
 
-def changes(model: Model, reference: Robot) -> tuple[Statement, ...]:
+def changes(model: LiveModel, reference: Robot) -> tuple[Statement, ...]:
     """What the last stretches say of a robot that was fitted before: which numbers changed, by how much, and what that
     looks like. Nothing until there are enough of them."""
     sums = model.latest

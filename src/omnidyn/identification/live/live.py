@@ -11,7 +11,7 @@ import numpy as np
 from omnidyn.arguments import check_order, is_number
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.live.change import MASSES, changes
-from omnidyn.identification.live.model import HeldOut, Model
+from omnidyn.identification.live.model import LiveModel, PredictedStretch
 from omnidyn.identification.live.rows import Rows, part
 from omnidyn.identification.live.status import LiveNumber, LiveStatus
 from omnidyn.identification.methods import OutputError
@@ -85,9 +85,9 @@ class Live:
         self._fitted_rows, self._fitted_at = 0, 0.0
         self._next_try, self._gap, self._waiting = FIRST, 0.0, f"the first fit takes {FIRST:g} s of rows"
         self._was_reached, self._enough_at, self._held_out = False, None, None
-        self._model: Model | None
+        self._model: LiveModel | None
         self._enough_at: float | None
-        self._held_out: HeldOut | None
+        self._held_out: PredictedStretch | None
         self._status = LiveStatus(robot.name, waiting=self._waiting)
 
     @property
@@ -170,7 +170,7 @@ class Live:
         assert run is not None
         last = part(run, max(len(run) - FIT_ROWS, 0), len(run))
         try:
-            model = Model(last, self.robot, self.method)
+            model = LiveModel(last, self.robot, self.method)
         except InsufficientDataError as error:
             self._waiting, self._next_try = str(error), GROWTH * self._next_try
             return

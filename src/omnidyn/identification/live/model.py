@@ -42,7 +42,7 @@ CHANCE = 5.0  # standard errors of a mean square that noise alone does not reach
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class PredictedStretch:
     """A stretch of rows that had no say in the numbers that predicted it. start, end [s]. ratio: channel -> mean square
     of what was not predicted over what noise, and what is open of the numbers, lead one to expect. limit: of each,
     which chance does not pass. has_signal: whether anything moved."""
@@ -64,7 +64,7 @@ class HeldOut:
         return tuple(name for name, ratio in self.ratio.items() if ratio > self.limit[name])
 
 
-class Model:
+class LiveModel:
     """What the rows so far say. values (P,): of the numbers, uncertainty: of them; both as of the last `settle`.
 
     fitted_at [s]: of the last row in the whole fit. start [s]: of the stretch that is not closed yet.
@@ -100,7 +100,7 @@ class Model:
         self.open = self.told_by(rows, self.start, end)
         self._settle()
 
-    def judge(self, end: float) -> HeldOut:
+    def judge(self, end: float) -> PredictedStretch:
         """How well the open stretch was predicted by the numbers at its start."""
         predicted = self.open.at(self._before)
         number = np.maximum(predicted.number, 1.0)
@@ -112,7 +112,7 @@ class Model:
         limit = 1.0 + CHANCE * np.sqrt(2.0 / number)
         names = [f"{name}[{index}]" for name, index in predicted.columns]
         kept = [(name, k) for k, name in enumerate(names) if shown[k]]
-        return HeldOut(
+        return PredictedStretch(
             self.start,
             end,
             {name: float(ratio[k]) for name, k in kept},
@@ -126,7 +126,7 @@ class Model:
         self.sums, self.open, self.start = self.sums.plus(self.open), self._empty(), end
         self._begin()
 
-    def go_on(self, before: Model) -> None:
+    def go_on(self, before: LiveModel) -> None:
         """Take over what a model of earlier rows keeps: its last stretches, and what rows said that are gone."""
         self.past = None if before.past is None else self._renamed(before.past, before)
         if before.problem.columns == self.problem.columns and before.problem.names == self.problem.names:
@@ -211,7 +211,7 @@ class Model:
             state = at(Point(point.values, Normal(solver, state).moved(0.0, still, np.diag(none), none).states))
         return state
 
-    def _renamed(self, quadratic: Quadratic, before: Model) -> Quadratic:
+    def _renamed(self, quadratic: Quadratic, before: LiveModel) -> Quadratic:
         """A quadratic of another model in the numbers of this one; one that is new has not shown there."""
         names = before.problem.names
         at = [names.index(name) if name in names else -1 for name in self.problem.names]

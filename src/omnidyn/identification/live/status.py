@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from omnidyn.document import Document, Points, Table, interval_cell, plain
-from omnidyn.identification.live.model import HeldOut
+from omnidyn.identification.live.model import PredictedStretch
 from omnidyn.model.keys import in_words
 from omnidyn.shown import Displayable
 from omnidyn.statement import NOTE, WARNING, Statement, as_verdict
@@ -53,7 +53,7 @@ class LiveStatus(Displayable):
     seconds: float = 0.0
     rows: int = 0
     numbers: Mapping[str, LiveNumber] = field(default_factory=dict)
-    held_out: HeldOut | None = None
+    held_out: PredictedStretch | None = None
     enough_at: float | None = None
     restarts: int = 0
     gap: float = 0.0
