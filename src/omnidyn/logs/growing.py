@@ -47,7 +47,7 @@ class GrowingTable:
                 expected="rows of text, such as CSV",
                 where=self.source,
             )
-        self._lines += [line for line in lines if line.strip() and line != self._head]
+        self._lines += [line for line in lines if line.strip()]
         return self._read() if len(self._lines) > (FIRST_ROWS if self.columns is None else 0) else []
 
     def end(self) -> list[Run]:
@@ -62,6 +62,7 @@ class GrowingTable:
         lines, self._lines = self._lines, []
         if not self._head and self.options.header:
             self._head, *lines = lines
+        lines = [line for line in lines if line != self._head]  # a logger that begins anew writes it once more
         if not lines:
             return []
         table = self._table(lines)
