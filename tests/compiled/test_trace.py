@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from omnidyn.compiled.trace import scalar_function
+from omnidyn.compiled.scalar_function import scalar_function
 
 PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
 

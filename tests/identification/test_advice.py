@@ -7,6 +7,7 @@ from omnidyn.identification.estimate import Correlation
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.stability import Stability
+from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
 from omnidyn.statement import quoted
 
@@ -30,6 +31,35 @@ def missing(*remedies):
         study=lambda: Diagnosis(lack, {}, Stability({}, ())),
     )
     return [each for each in advice(fit, None) if each.code == "missing_cause"]
+
+
+def held(robot, missed=("a3",), value=()):
+    """What is advised to be fitted too, of a fit that misses outputs."""
+    fit = OutputErrorEstimate(
+        robot=robot,
+        value=dict.fromkeys(value, 1.0),
+        std=dict.fromkeys(value, 0.01),
+        ci95=dict.fromkeys(value, (0.98, 1.02)),
+        correlation=Correlation((), np.eye(0)),
+        degrees_of_freedom={},
+        not_followed=dict.fromkeys(missed, 50.0),
+        study=lambda: Diagnosis(LackOfFit(True, {}, {}, (), (DISC,), {}), {}, Stability({}, ())),
+    )
+    return [each for each in advice(fit, None) if each.code in ("held_numbers", "try_ladder")]
+
+
+def test_numbers_that_a_file_gives_as_exact_are_doubted_where_the_model_does_not_follow():
+    """Copied from elsewhere they are wrong, and no friction makes up for that; the ladder looks elsewhere."""
+    robot = load_robot("axebot").replace(priors={})
+    (one,) = held(robot)
+    assert str(one) == (
+        "the fit holds motor.torque_constant_Nm_A, motor.resistance_ohm, body.inertia_kg_m2, which the robot file "
+        "gives as exact: fit them too (`free` friction `free` motor.torque_constant_Nm_A `free` motor.resistance_ohm "
+        "`free` body.inertia_kg_m2)"
+    )
+    (two,) = held(robot.replace(priors={"body.inertia_kg_m2": Prior(std=0.1)}), value=["motor.resistance_ohm"])
+    assert two.numbers["keys"] == ("motor.torque_constant_Nm_A",)
+    assert not any(each.code == "held_numbers" for each in held(robot, missed=()))
 
 
 def test_of_remedies_that_explain_the_same_only_the_first_is_advised():

@@ -41,6 +41,48 @@ def test_what_was_written_comes_back(kind, robot):
     assert "wheel1" in again.source
 
 
+MECANUM = omnidyn.load_robot("mecanum")
+
+
+@pytest.mark.parametrize("kind", [0, 1], ids=["urdf", "mjcf"])
+@pytest.mark.parametrize("wheelbase", [None, 0.15, 0.3])
+@pytest.mark.parametrize("turned", [0.0, 90.0])
+def test_mecanum_wheels_come_back(kind, wheelbase, turned):
+    """A body whose x points forward, or aside: parallel axles are those of mecanum wheels, rollers in an X."""
+    if kind:
+        pytest.importorskip("mujoco")
+    write, read = pairs()[kind]
+    azimuths = tuple(angle + turned for angle in MECANUM.wheels.azimuth_deg)
+    robot = MECANUM.replace(wheels=MECANUM.wheels.replace(azimuth_deg=azimuths, wheelbase=wheelbase))
+    again = read(write(robot).text, "file", robot)
+    np.testing.assert_allclose(again.wheels.wrench_matrix, robot.wheels.wrench_matrix, atol=1e-9)
+    np.testing.assert_allclose(again.wheels.places, robot.replace(wheels=again.wheels).wheels.places, atol=1e-12)
+    assert again.wheels.wheelbase == pytest.approx(wheelbase or 0.2)
+    assert again.body.mass == pytest.approx(robot.body.mass, rel=1e-9)
+    assert again.body.inertia == pytest.approx(robot.body.inertia, rel=1e-9)
+    assert again.priors["wheels.roller_angle_deg"].origin == "guess"
+    assert again.priors["wheels.wheelbase_m"].origin == "imported"
+
+
+@pytest.mark.parametrize("name", ["axebot", "mecanum", "four-wheel"])
+def test_a_wheel_of_which_nothing_is_known_comes_back_as_such(name):
+    """The file of a format that asks for masses of wheels holds placeholders: they are no inertia."""
+    robot = omnidyn.load_robot(name)
+    again = robot_of_urdf(urdf(robot).text)
+    assert not robot.wheels.wheel_inertia
+    assert again.wheels.wheel_inertia == 0.0
+    assert "wheels.inertia_kg_m2" not in again.priors
+    heavy = robot.replace(wheels=robot.wheels.replace(wheel_inertia=1e-5))
+    assert robot_of_urdf(urdf(heavy).text).wheels.wheel_inertia == pytest.approx(1e-5)
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_the_turning_frame_is_that_of_the_robot_that_it_is_like(turns):
+    other = ROBOT.replace(body=ROBOT.body.replace(rotating_frame=turns))
+    assert robot_of_urdf(urdf(ROBOT).text, other=other).body.rotating_frame is turns
+    assert robot_of_urdf(urdf(ROBOT).text).body.rotating_frame is True
+
+
 def test_without_another_robot_the_rest_is_a_guess():
     robot = robot_of_urdf(urdf(ROBOT).text)
     assert robot.priors["motor.resistance_ohm"].origin == "guess"

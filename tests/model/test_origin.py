@@ -1,5 +1,6 @@
 """The origin of a number: a value of the robot file. Files from before there were origins are read as they were."""
 
+import re
 import tomllib
 from collections import Counter
 from pathlib import Path
@@ -7,7 +8,7 @@ from typing import get_args
 
 import pytest
 
-from omnidyn.model.first_guess import guessed, reasons
+from omnidyn.model.first_guess import first_guess, guessed, reasons
 from omnidyn.model.keys import DIRECTION, EMF, TORQUE, all_keys
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Origin, Prior
@@ -105,3 +106,21 @@ GUESSED_OF = {
 @pytest.mark.parametrize("name", preset_names())
 def test_the_guesses_of_a_preset_are_marked(name):
     assert guessed(load_robot(name)) == GUESSED_OF.get(name, [])
+
+
+def test_a_guess_without_a_std_is_as_wide_as_that_of_a_new_robot():
+    """A guess is never exact: a fit must be free to leave it, as it leaves those of `init`."""
+    robot = first_guess("new", load_robot("four-wheel").wheels, 8.0)
+    bare = re.sub(r", std = [^,}]*", "", robot_to_toml(robot))
+    assert "std" not in bare
+    assert parse_robot(bare).priors == robot.priors
+
+
+def test_a_guess_that_has_no_width_stays_as_it_is():
+    """A drawing, nothing, and words."""
+    text = robot_to_toml(load_robot("four-wheel").replace(priors={}))
+    told = re.sub(r'kind = ("\w+")', r'kind = { value = \1, origin = "guess" }', text)
+    told = re.sub(r"(azimuth_deg|rotor_inertia_kg_m2) = ([^#\n]+)", r'\1 = { value = \2, origin = "guess" }', told)
+    robot = parse_robot(told)
+    assert robot.priors
+    assert all(prior.std is None for key, prior in robot.priors.items() if "rotor" not in key)

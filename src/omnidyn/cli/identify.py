@@ -67,6 +67,13 @@ def identify(
     force: bool = typer.Option(False, "--force", help="Replace files that exist.", rich_help_panel=MORE_PANEL),
     json: bool = typer.Option(False, "--json", help="The result for machines."),
     full: bool = typer.Option(False, "--full", help="All that the result says, not only the first screen."),
+    planned: str = typer.Option(
+        "",
+        "--planned",
+        metavar="PLAN.json",
+        help="What omnidyn plan promised of this drive, to show beside it.",
+        rich_help_panel=MORE_PANEL,
+    ),
     flags: LogFlags = NO_FLAGS,
     **given: Any,
 ) -> None:
@@ -77,7 +84,7 @@ def identify(
     speed, or from a table of steady points. The answer carries standard errors, 95 % intervals and warnings in words,
     and says what the data cannot tell.
     """
-    request, to = identify_options.identify_request(given), Out(report, out, force, json, full)
+    request, to = identify_options.identify_request(given), Out(report, out, force, json, full, planned)
     if not robot and request.what != MOTORS:
         of_motors = os.path.isfile(logs[0]) and table_kind(logs) == MOTOR_TABLE
         table = f" {logs[0]} is a table of motors: say --what motors, which needs no robot." if of_motors else ""
@@ -85,7 +92,7 @@ def identify(
     for path in (out, report):  # before any work
         if path:
             check_output(path, force)
-    options.keep_inputs(logs, [robot], [flags.map_file], out, report, flags.save_map)
+    options.keep_inputs(logs, [robot], [flags.map_file, planned], out, report, flags.save_map)
     options.refuse_missing(logs)
     _identify(logs, robot, request, LogReading(flags.options(), flags.sort, flags.maps(force)), to)
 

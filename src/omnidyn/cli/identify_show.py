@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import omnidyn
 from omnidyn.attempts import Attempts
-from omnidyn.cli.identify_brief import brief
+from omnidyn.cli.identify_brief import brief, with_plan
 from omnidyn.cli.terminal.flags import with_flags
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import tell as tell_document
 from omnidyn.files import check_output, keep_apart, write_atomic
 from omnidyn.identification.methods import SteadyState
+from omnidyn.identification.planning.got import beside
 from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
@@ -29,14 +30,15 @@ PAGE = "page"
 
 @dataclass(frozen=True)
 class Out:
-    """Where results go. files: name of the robot -> file that holds it now. refused: why a robot file could not be
-    written."""
+    """Where results go. planned: the plan to show them beside. files: name of the robot -> file that holds it now.
+    refused: why a robot file could not be written."""
 
     report: str
     out: str
     force: bool
     json: bool
     full: bool = False
+    planned: str = ""
     files: dict[str, str] = field(default_factory=dict)
     refused: list[Exception] = field(default_factory=list)
 
@@ -101,7 +103,10 @@ def tell(
     if of_points:
         document, output = result.estimate.document(), files[0] if files else None
     else:
-        document, output = result.document() if to.json or to.full else brief(result), to.files or None
+        got = beside(to.planned, result.estimate) if to.planned else {}
+        document, output = result.document() if to.json or to.full else brief(result, got), to.files or None
+        if got and (to.json or to.full):
+            document = with_plan(document, got)
     tell_document(document, to.json, record, output=output, report=report or None)
     say_written([*files, *([report] if report else [])])
     to.finish(attempts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,10 +14,10 @@ from omnidyn.cli.terminal.numbers import number_list
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
-from omnidyn.cli.terminal.streams import say
-from omnidyn.cli.terminal.telling import tell
+from omnidyn.cli.terminal.streams import say, to_json
+from omnidyn.cli.terminal.telling import as_json, tell
 from omnidyn.errors import InputError
-from omnidyn.files import check_output
+from omnidyn.files import check_output, write_atomic
 
 if TYPE_CHECKING:
     from omnidyn.identification.planning.planned import Plan
@@ -25,7 +26,11 @@ if TYPE_CHECKING:
 def plan(
     robot: str = typer.Argument(metavar="ROBOT", help="A preset (see: omnidyn robots) or a robot file."),
     out: str = typer.Option(
-        "", "-o", "--out", metavar="OUT", help="CSV file for the program; OUT-check beside it, to judge the fit by."
+        "",
+        "-o",
+        "--out",
+        metavar="OUT",
+        help="CSV file for the program; OUT-check and OUT.json beside it, to judge the fit by.",
     ),
     area: str = typer.Option("3x3", metavar="XxY", help="Free floor [m]; it begins in the middle, along x."),
     time: float = typer.Option(60.0, metavar="S", help="Of all of it [s]."),
@@ -52,7 +57,7 @@ def plan(
     A program of moves, from rest to rest, that stay inside a room, and how well each number will be known after it.
     Drive it, log it, and give the log to identify.
     """
-    files = [out, _check_file(out)] if out else []
+    files = [out, _check_file(out), str(Path(out).with_suffix(".json"))] if out else []
     for path in files:
         check_output(path, force)
     refuse_picture(picture, force)
@@ -62,8 +67,12 @@ def plan(
     with shown_progress("planning") as progress:
         made = omnidyn.plan(loaded, sizes, time, free=free, aim=for_, noise=stds, rate=rate, progress=progress)
     if out:
-        for path, held_out in zip(files, (False, True), strict=True):
+        for path, held_out in zip(files, (False, True), strict=False):
             _write(made, held_out, path, force)
+        promised = as_json(
+            made.document(), provenance([source]), program_sha256=sha256(Path(out).read_bytes()).hexdigest()
+        )
+        write_atomic(files[-1], to_json(promised) + "\n", force)
     tell(made.document(), json, provenance([source]), output=out or None)
     if picture:
         from omnidyn.report.figures.plan import draw_plan

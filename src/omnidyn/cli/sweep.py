@@ -49,11 +49,11 @@ def sweep(
     if what not in (STATUS, RESUME, MERGE, PLOT):
         if folder or not out:
             raise typer.BadParameter("a spec needs -o FOLDER; without a spec: status, resume, merge or plot FOLDER.")
-        return _run(what, out, workers, scheduler, shard, False, metric, limit, json)
+        return _end(_run(what, out, workers, scheduler, shard, False), metric, limit, json)
     if not folder:
         raise typer.BadParameter(f"{what} needs a FOLDER.")
     if what == RESUME:
-        return _run("", folder, workers, scheduler, shard, repair, metric, limit, json)
+        return _end(_run("", folder, workers, scheduler, shard, repair), metric, limit, json)
     campaign = omnidyn.load_campaign(folder)
     if what == MERGE:
         _merge(campaign, out, force)
@@ -69,6 +69,12 @@ def sweep(
     _tell(campaign, metric, limit, json)
 
 
+def _end(campaign: Campaign, metric: str, limit: float | None, json: bool) -> None:
+    _tell(campaign, metric, limit, json)
+    if campaign.verdict.code == "fits_failed":  # at the end, with everything else done
+        end_failed(campaign.verdict)
+
+
 def _run(
     spec: str,
     folder: str,
@@ -76,10 +82,7 @@ def _run(
     scheduler: str,
     shard: str,
     repair: bool,
-    metric: str,
-    limit: float | None,
-    json: bool,
-) -> None:
+) -> Campaign:
     part = _part(shard)
     with shown_progress("reading the spec") as progress:
         progress(Report("starting"))
@@ -93,9 +96,7 @@ def _run(
             progress=progress,
         )
     say(f"omnidyn: shards are in {folder}; one file of them: omnidyn sweep merge {folder}")
-    _tell(campaign, metric, limit, json)
-    if campaign.verdict.code == "fits_failed":  # at the end, with everything else done
-        end_failed(campaign.verdict)
+    return campaign
 
 
 def _merge(campaign: Campaign, out: str, force: bool) -> None:

@@ -1,18 +1,15 @@
 """A function of arrays as a formula: it is run on arrays whose entries are expressions, and what comes out is written.
 
     twist = inputs("twist", (3,))
-    scalar_function({"twist": (3,)}, some_function)     the same, of plain numbers: in microseconds
 
 Numbers that do not depend on the inputs are worked out now, in float64; what is 0 falls away. A branch on an input
-raises TranslationError: the caller traces both sides. As C: export/code/trace.py.
+raises TranslationError: the caller traces both sides. As C: export/code/trace.py; of plain numbers: scalar_function.py.
 """
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from math import copysign, cos, exp, inf, nan, sin, sqrt
 from typing import Any, Self
 
 import numpy as np
@@ -286,105 +283,11 @@ class StatementWriter:
         return self.names[text]
 
 
-def _over(a: float, b: float) -> float:
-    """a/b, as NumPy has it where b is 0: what no branch takes is worked out too."""
-    if b:
-        return a / b
-    return nan if a == 0.0 or a != a else copysign(inf, a) * copysign(1.0, b)
-
-
-def _exp(a: float, _: float) -> float:
-    try:
-        return exp(a)
-    except OverflowError:
-        return inf
-
-
-# As a function of plain numbers: NumPy takes a microsecond for each operation, Python a tenth of that. No text becomes
-# code: the operations are walked one by one.
-_NUMBERS: dict[str, Callable[[float, float], float]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": _over,
-    ">": operator.gt,
-    ">=": operator.ge,
-    "<": operator.lt,
-    "<=": operator.le,
-    "==": operator.eq,
-    "and": operator.and_,
-    "pow": operator.pow,
-    "max": lambda a, b: a if a >= b else b,
-    "min": lambda a, b: a if a <= b else b,
-    "not": lambda a, _: not a,
-    "neg": lambda a, _: -a,
-    "abs": lambda a, _: abs(a),
-    "sqrt": lambda a, _: sqrt(a) if a >= 0.0 else nan,
-    "cos": lambda a, _: cos(a),
-    "sin": lambda a, _: sin(a),
-    "exp": _exp,
-    "sign": lambda a, _: float((a > 0.0) - (a < 0.0)),
-}
-
-
-def scalar_function(
-    arguments: Mapping[str, tuple[int, ...]], run: Callable[..., Mapping[str, Any]]
-) -> Callable[..., tuple[float, ...]] | None:
-    """What `run` gives, arrays by name, of arguments by name and shape; None where it cannot be traced.
-
-    The function takes a tuple for each argument, entries in order (a number for shape ()), and returns all entries.
-    """
-    given = {name: inputs(name, shape) for name, shape in arguments.items()}
-    try:
-        outputs = run(*given.values())
-    except TranslationError:
-        return None
-    wanted = [node for value in outputs.values() for node in as_objects(value).ravel()]
-    places: dict[Any, int] = {}
-    for name, shape in arguments.items():
-        for index in np.ndindex(shape):
-            places[name + "".join(f"[{k}]" for k in index)] = len(places)
-    constants = {*filter(_is_constant, wanted), *(c for node in _nodes(wanted) for c in node.of if _is_constant(c))}
-    places |= {number: len(places) + k for k, number in enumerate(map(float, constants))}
-    steps: list[tuple[Any, int, int, int]] = []
-    equal: dict[tuple[Any, ...], int] = {}
-
-    def place(node: Any) -> int:
-        return places[float(node) if _is_constant(node) else id(node) if node.operation else node.name]
-
-    first = len(places)
-    for node in _nodes(wanted):
-        if not node.operation:
-            continue
-        of = [place(operand) for operand in node.of]
-        key = (node.operation, *of)
-        if key not in equal:
-            equal[key] = first + len(steps)
-            a, b, c = (*of, *(of[-1:] * 2))[:3]
-            steps.append((_NUMBERS.get(node.operation), a, b, c if node.operation == "?" else -1))
-        places[id(node)] = equal[key]
-    numbers = [float(number) for number in constants]
-    found = [place(node) for node in wanted]
-    single = [not shape for shape in arguments.values()]
-
-    def traced(*values: Any) -> tuple[float, ...]:
-        cells: list[Any] = []
-        for value, alone in zip(values, single, strict=True):
-            cells.append(value) if alone else cells.extend(value)
-        cells += numbers
-        add = cells.append
-        for work, a, b, c in steps:
-            add(work(cells[a], cells[b]) if c < 0 else cells[b] if cells[a] else cells[c])
-        return tuple([cells[k] for k in found])
-
-    return traced
-
-
-def _is_constant(node: Any) -> bool:
+def is_constant(node: Any) -> bool:
     return not isinstance(node, Node)
 
 
-def _nodes(wanted: Iterable[Any]) -> list[Node]:
+def nodes_under(wanted: Iterable[Any]) -> list[Node]:
     """All expressions under some, each once, operands first."""
     seen: dict[int, Node] = {}
 

@@ -345,8 +345,10 @@ def failure(error: Exception) -> str:
 
 def per_volt(output: str, supply: Any, before: float) -> float:
     """The duty that one volt is behind a supply measured now [V]; as `before` for another output, or without one."""
+    if output != DUTY or supply is None:
+        return before
     volts = _number(supply)
-    return 1.0 / volts if output == DUTY and 0.0 < volts <= MOST_SUPPLY else before
+    return 1.0 / volts if 0.0 < volts <= MOST_SUPPLY else before
 
 
 def _number(value: Any) -> float:

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray, product
-from omnidyn.compiled.trace import scalar_function
+from omnidyn.compiled.scalar_function import scalar_function
 from omnidyn.control.controller import WHEEL_SPEED, Guarded
 from omnidyn.control.feedforward import DT, LoopCommands, Volts, check_delay, check_dt, lateness
 from omnidyn.control.paths.ahead import Ahead
@@ -107,6 +107,7 @@ class Pid(Guarded):
         self.farthest = self._farthest()
         self._limits = tuple((self.volts if self.output != WHEEL_SPEED else self.commands).limit.tolist())
         self._current_limits = tuple(self.volts.current_limit.tolist())
+        self._has_current_limit = bool(np.isfinite(self.volts.current_limit).any())
         self._law = _in_numbers(*self.law())
 
     def _farthest(self) -> tuple[float, float]:
@@ -181,17 +182,18 @@ class Pid(Guarded):
                 break
         return self._sent(np.array(sent)), met
 
-    def _within(self, volts: Sequence[float], currents: Sequence[float]) -> tuple[list[float], tuple[str, ...]]:
+    def _within(self, volts: Sequence[float], currents: Sequence[float]) -> tuple[Sequence[float], tuple[str, ...]]:
         """The volts within the limit of each motor, and the limits met: see `Volts.within`."""
         met: tuple[str, ...] = ()
         for volt, limit in zip(volts, self._limits, strict=True):
             if not abs(volt) < limit:
                 met = ("voltage",)
-        for current, limit in zip(currents, self._current_limits, strict=True):
+        if met:
+            volts = [min(max(volt, -limit), limit) for volt, limit in zip(volts, self._limits, strict=True)]
+        for current, limit in zip(currents, self._current_limits, strict=True) if self._has_current_limit else ():
             if abs(current) > limit:
-                met = (*met, "current")
-                break
-        return [min(max(volt, -limit), limit) for volt, limit in zip(volts, self._limits, strict=True)], met
+                return volts, (*met, "current")
+        return volts, met
 
     def _commanded(
         self,
@@ -207,11 +209,11 @@ class Pid(Guarded):
             self._reached = twist
         else:
             rows = zip(self._loop_sum, self._last.tolist(), self._mean, strict=True)
-            self._loop_sum = tuple(total + dt * (sent - mean) for total, sent, mean in rows)
+            self._loop_sum = tuple([total + dt * (sent - mean) for total, sent, mean in rows])
         count = len(self._zeros)
         found = self._law(off, heading, velocity, raised_sum, 1.0, self._reached, self._loop_sum)
         volts = found[2 * count : 3 * count]
-        share = max(abs(volt) / limit for volt, limit in zip(volts, self._limits, strict=True))
+        share = max([abs(volt) / limit for volt, limit in zip(volts, self._limits, strict=True)])
         if share <= 1.0:
             self._sum = raised_sum
         else:  # slower, as the motors can

@@ -235,7 +235,11 @@ _MUJOCO = {
     ),
     "wheels": Cell(PARTLY, "its dry part is a box along x and y of the body, of the level along each axis alone"),
     "plain": Cell(LEAVES_OUT, "its ellipse is that of maximum dissipation"),
-    "breakaway": Cell(LEAVES_OUT, "it breaks away at the Coulomb level"),
+    "breakaway": Cell(
+        LEAVES_OUT,
+        "it breaks away at the Coulomb level, and slides on a slope that the robot holds; to hold there, export a copy "
+        "of the robot file with coulomb raised to breakaway",
+    ),
     "no-frame": _NEWTON,
     "inductance": Cell(LEAVES_OUT, "currents settle at once"),
     "drop": Cell(LEAVES_OUT, "actuators are linear in the volts"),

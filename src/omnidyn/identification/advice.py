@@ -10,6 +10,7 @@ from omnidyn.identification.lack_of_fit import CHANGE, Remedy
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES
 from omnidyn.identification.validation import Validation
+from omnidyn.identification.verdict import fit_failure
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import BOX, EMF, TORQUE, Key, find_key
 from omnidyn.model.robot import GUESSES
@@ -26,7 +27,9 @@ FREEABLE = (TORQUE, "motor.resistance_ohm", "body.inertia_kg_m2")
 
 def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[Statement]:
     """What to measure or to ask for next, gravest first."""
-    statements = [*_not_seen(fit), *_missing(fit), *_guesses(fit), *_together(fit), *_wide(fit)]
+    held = [*_held(fit)] if fit_failure(fit, validation) is not None else []
+    missing = [statement for statement in _missing(fit) if not held or statement.code != "try_ladder"]
+    statements = [*held, *_not_seen(fit), *missing, *_guesses(fit), *_together(fit), *_wide(fit)]
     statements += [replace(statement, severity=NOTE) for statement in fit.robot.pose_lag_of_log]
     if validation is not None and validation.held_out is None:
         statements.append(Statement("hold_out_log", NOTE))
@@ -103,6 +106,14 @@ def _guesses(fit: OutputErrorEstimate) -> Iterator[Statement]:
     freeable = tuple(key for key in FREEABLE if key in guessed_keys)
     if guessed_keys and _misses(fit):
         yield Statement("guessed_numbers", NOTE, numbers={"keys": tuple(guessed_keys), "freeable": freeable})
+
+
+def _held(fit: OutputErrorEstimate) -> Iterator[Statement]:
+    """What the robot file gives as exact, of a model that does not follow: a number copied from elsewhere is rarely."""
+    known_numbers = {Key.parse(key).name for key in (*fit.robot.priors, *fit.value) if find_key(key)}
+    freeable = tuple(key for key in FREEABLE if key not in known_numbers)
+    if freeable:
+        yield Statement("held_numbers", NOTE, numbers={"keys": freeable})
 
 
 def _together(fit: OutputErrorEstimate) -> Iterator[Statement]:

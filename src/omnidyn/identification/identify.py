@@ -48,7 +48,8 @@ from omnidyn.logs.log import Log
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.drive import SPEED
-from omnidyn.model.robot import Robot
+from omnidyn.model.keys import EMF, TORQUE, Key, expand, find_key, with_priors
+from omnidyn.model.robot import GUESS, Prior, Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
 from omnidyn.statement import NOTE, WARNING, Statement, statements
@@ -283,7 +284,7 @@ def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], requ
     names = list(dict.fromkeys(group for _, group in fitted_runs))
     if named_groups and len(names) == 1:
         raise InputError("the logs have only one group", got=names[0], expected="two or more", where="groups")
-    verdicts = log_verdicts(check, robot, request.progress)
+    verdicts = log_verdicts(check, _doubted(robot, method.free or ()), request.progress)
     request.progress(Report("fitting: loading"))
     start_time = process_time()
     answer, cut = _answered(
@@ -306,6 +307,13 @@ def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], requ
         return _after(fits, runs_of_group, held_out_runs, verdicts, check, _not_independent(runs, held_mask), request)
 
     return Identification(method, fits, follow, answer.differences, interrupted=cut)
+
+
+def _doubted(robot: Robot, free: Sequence[str]) -> Robot:
+    """The robot with what is asked to be fitted as a guess: what `check` says by it is judged anew by the fit."""
+    names = [entry for name in free for entry in expand(name, robot) if find_key(entry)]
+    magnet = [EMF] if any(Key.parse(name).name == TORQUE for name in names) else []
+    return with_priors(robot, dict.fromkeys([*names, *magnet], Prior(origin=GUESS)))
 
 
 def _after(

@@ -1,9 +1,10 @@
 """A robot from its parts, as files of links and joints tell them: masses, inertias, wheels on axles.
 
 The body is all there is: mass of all parts, inertia about the vertical through their centre of mass. The centre of the
-wheels is where their axles meet, as those of omni wheels do: the angle of rollers is in no such file. A wheel stands at
-the azimuth of its place, seen from there; the centre of mass may stand beside it. Motors and friction of the floor are
-not in them either: they come from another robot, or are guessed.
+wheels is where their axles meet, as those of omni wheels do. A wheel stands at the azimuth of its place, seen from
+there; the centre of mass may stand beside it. Four wheels on parallel axles at the corners of a rectangle are mecanum
+wheels, for no others move aside; the angle of their rollers is in no such file, and is a guess: an X, seen from above.
+Motors and friction of the floor are not in them either: they come from another robot, or are guessed.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.first_guess import first_guess, like
-from omnidyn.model.robot import IMPORTED, Prior, Robot
+from omnidyn.model.robot import GUESS, IMPORTED, Prior, Robot
 from omnidyn.model.value import to_list
 from omnidyn.model.wheels import MAX_WHEELS, MIN_WHEELS, Wheels
 
@@ -25,6 +26,10 @@ AXLE_ANGLE = math.radians(1.0)  # by which an axle may miss the centre
 NEGLIGIBLE_SHARE = 1e-3  # of the distance of the wheels: files give angles as 1.57 and the like
 SAME_NUMBER = 1e-9  # relative: numbers that differ by less are one number
 LONGEST_NAMES = 150
+PLACEHOLDER = 1e-3  # of the robot: the mass of a wheel that stands for one of which nothing is known
+ROLLER_ANGLE = 45.0  # [degree] of a mecanum wheel, as nearly all have it
+MECANUM_CORNERS = {(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)}
+ROLLERS = "its axles are parallel: taken as mecanum wheels, rollers in an X seen from above"
 LARGEST_NUMBER = 1e9  # of any number of a part, in SI units
 
 
@@ -94,8 +99,10 @@ def _refuse_impossible(lumps: Sequence[Lump], axles: Sequence[Axle]) -> None:
 
 def _robot(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], where: str, other: Robot | None) -> Robot:
     mass, turning, centre = whole(lumps)
-    middle = _middle(axles, centre)
-    wheels, off = _wheels(axles, middle), centre[:2] - middle[:2]
+    corners = _corners(axles)
+    middle = _middle(axles, centre) if corners is None else _near(centre, np.mean([a.centre for a in axles], axis=0))
+    axles = [axle._replace(inertia=_unless_placeholder(axle, mass)) for axle in axles]
+    wheels, off = _wheels(axles, middle, corners), centre[:2] - middle[:2]
     robot = first_guess(name, wheels, mass) if other is None else like(other, name, wheels, mass)
     if turning > 0.0:
         robot = robot.replace(body=robot.body.replace(inertia=turning))
@@ -112,11 +119,56 @@ def _robot(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], where: str, 
     }
     other_priors = {key: prior for key, prior in robot.priors.items() if key.partition("[")[0] not in imported_keys}
     origin = Prior(source=f"imported from {where}"[:300], origin=IMPORTED)
+    if corners is not None:
+        other_priors["wheels.roller_angle_deg"] = Prior(source=ROLLERS, origin=GUESS)
+        imported_keys.add("wheels.wheelbase_m")
     joints = ", ".join(axle.name for axle in axles)[:LONGEST_NAMES]
     return robot.replace(
         source=f"imported from {where}; wheels: {joints}"[:400],
         priors=other_priors | dict.fromkeys(imported_keys, origin),
     )
+
+
+def _unless_placeholder(axle: Axle, mass: float) -> float:
+    """The inertia of a wheel about its axle; 0 where it weighs next to nothing: a placeholder, for simulators ask for
+    some."""
+    least = 0.5 * PLACEHOLDER * mass * (axle.radius or 0.0) ** 2
+    return axle.inertia if axle.inertia > least * (1.0 + SAME_NUMBER) else 0.0
+
+
+class Corners(NamedTuple):
+    """Where four mecanum wheels stand, wheel by wheel, seen from their middle.
+
+    azimuth [degree] of the axle, outwards; out: along it [m]; ahead: a quarter turn counter-clockwise from it [m].
+    """
+
+    azimuth: FloatArray
+    out: FloatArray
+    ahead: FloatArray
+
+
+def _corners(axles: Sequence[Axle]) -> Corners | None:
+    """Four wheels on parallel axles at the corners of a rectangle; None for others."""
+    if len(axles) != len(MECANUM_CORNERS):
+        return None
+    axes, places = np.array([axle.axis[:2] for axle in axles]), np.array([axle.centre[:2] for axle in axles])
+    along = axes[0] / math.hypot(*axes[0])
+    if np.max(np.abs(axes @ [-along[1], along[0]])) > AXLE_ANGLE:
+        return None
+    places = places - places.mean(axis=0)
+    out, ahead = places @ along, places @ [-along[1], along[0]]
+    side = np.sign(out)
+    if {*zip(side.tolist(), np.sign(ahead).tolist(), strict=True)} != MECANUM_CORNERS:
+        return None
+    if any(np.ptp(np.abs(distance)) > AXLE_ANGLE * np.abs(distance).max() for distance in (out, ahead)):
+        return None
+    azimuth = np.degrees(np.arctan2(side * along[1], side * along[0]))
+    return Corners(azimuth, np.abs(out), side * ahead)
+
+
+def _near(centre: FloatArray, other: FloatArray) -> FloatArray:
+    """Another centre; the first where that is as near as makes no matter."""
+    return centre if math.hypot(*(other - centre)[:2]) <= NEGLIGIBLE_SHARE * math.hypot(*other[:2], 1.0) else other
 
 
 def _middle(axles: Sequence[Axle], centre: FloatArray) -> FloatArray:
@@ -132,8 +184,8 @@ def _middle(axles: Sequence[Axle], centre: FloatArray) -> FloatArray:
     return centre if math.hypot(*off) <= NEGLIGIBLE_SHARE * largest_distance else np.add(centre, [*off, 0.0])
 
 
-def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
-    """Where the wheels stand, seen from their centre."""
+def _wheels(axles: Sequence[Axle], centre: FloatArray, corners: Corners | None) -> Wheels:
+    """Where the wheels stand, seen from their centre. corners: of mecanum wheels."""
     if not MIN_WHEELS <= len(axles) <= MAX_WHEELS:
         raise InputError(
             "cannot tell the wheels",
@@ -150,6 +202,16 @@ def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
             got=", ".join(axle.name for axle in axles if axle.radius is None)[:LONGEST_NAMES],
             expected="a cylinder or a sphere, or the radius [m]",
             remedy="give it, such as `wheel_radius` 0.05",
+        )
+    inertia = _one_or_all([axle.inertia for axle in axles])
+    if corners is not None:
+        return Wheels(
+            azimuth_deg=tuple(float(f"{angle:.12g}") for angle in corners.azimuth),
+            roller_angle_deg=tuple(to_list(ROLLER_ANGLE * np.sign(corners.ahead))),
+            robot_radius=_one_or_all(corners.out + np.abs(corners.ahead)),
+            wheel_radius=_one_or_all(radii),
+            wheel_inertia=inertia,
+            wheelbase=2.0 * float(np.abs(corners.ahead).mean()),
         )
     azimuth, distances = [], []
     for axle in axles:
@@ -169,11 +231,11 @@ def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
         azimuth_deg=tuple(float(f"{angle:.12g}") for angle in azimuth),
         robot_radius=_one_or_all(distances),
         wheel_radius=_one_or_all(radii),
-        wheel_inertia=_one_or_all([axle.inertia for axle in axles]),
+        wheel_inertia=inertia,
     )
 
 
-def _one_or_all(values: Sequence[float]) -> float | tuple[float, ...]:
+def _one_or_all(values: Sequence[float] | FloatArray) -> float | tuple[float, ...]:
     """One number where all are the same, else one for each wheel."""
     array = np.asarray(values, dtype=float)
     if np.ptp(array) <= SAME_NUMBER * np.abs(array).max():

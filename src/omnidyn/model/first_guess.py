@@ -21,7 +21,20 @@ import numpy as np
 
 from omnidyn.model.drive import SPEED, Drive
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
-from omnidyn.model.keys import EMF, FRICTION, GAINS, ROTOR, TORQUE, VISCOUS, Key, all_keys, find_key, name_of
+from omnidyn.model.keys import (
+    EMF,
+    FRICTION,
+    GAINS,
+    ROTOR,
+    TORQUE,
+    VISCOUS,
+    Key,
+    all_keys,
+    expand,
+    find_key,
+    name_of,
+    with_priors,
+)
 from omnidyn.model.motor import Motor
 from omnidyn.model.robot import GIVEN, GUESS, GUESSES, IMPORTED, MEASURED, Body, Origin, Prior, Robot
 from omnidyn.model.surroundings import GRAVITY as GRAVITY
@@ -128,9 +141,25 @@ def first_guess(
         if key.name in given_keys or key.part == "wheels":
             priors[key.name] = Prior(origin=GIVEN)
         else:
-            spread = SPREAD.get(key.name, FRICTION_SPREAD)
-            priors[str(key)] = Prior(std=_round(spread * key.get(robot)), origin=GUESS)
+            priors[str(key)] = Prior(std=spread(key, robot), origin=GUESS)
     return robot.replace(priors=priors)
+
+
+def spread(key: Key, robot: Robot) -> float:
+    """The standard deviation of a guess, by what it is a guess of: as wide as the first guess of a robot."""
+    share = SPREAD.get(key.name, LIKE_SPREAD if key.part in ("body", "wheels") else FRICTION_SPREAD)
+    return _round(share * abs(key.get(robot)))
+
+
+def with_spread(robot: Robot) -> Robot:
+    """The robot with a std for every guess that has none: a guess is never exact, and a fit must be free to leave it.
+
+    A drawing stays as it is, and so does what is 0, for no share of it is a width.
+    """
+    bare = {name: prior for name, prior in robot.priors.items() if prior.origin == GUESS and prior.std is None}
+    keys = {entry: prior for name, prior in bare.items() if find_key(name) for entry in expand(name, robot)}
+    std = {name: spread(Key.parse(name), robot) for name in keys if name_of(name) not in EXACT_KEYS}
+    return with_priors(robot, {name: keys[name].replace(std=value) for name, value in std.items() if value > 0.0})
 
 
 def _speed_loop(motor: Motor, loop_numbers: Sequence[float]) -> Drive:
@@ -259,7 +288,7 @@ def like(
         source=f"omnidyn init: like {preset.name}, to be identified",
         wheels=wheels,
         motor=motor,
-        body=Body(mass=mass, inertia=inertia, rotating_frame=True),
+        body=Body(mass=mass, inertia=inertia, rotating_frame=preset.body.rotating_frame),
         drive=preset.drive,
         friction=friction,
         priors={},

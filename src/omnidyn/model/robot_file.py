@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 from omnidyn.arguments import check_order
 from omnidyn.errors import InputError
 from omnidyn.files import MAX_TOML_BYTES, parse_toml, read_text, write_atomic
+from omnidyn.model.first_guess import with_spread
 from omnidyn.model.keys import TABLES, is_told
 from omnidyn.model.known.told import correlation_of, refuse_strange_keys
 from omnidyn.model.presets import PRESETS as PRESETS
@@ -66,7 +67,7 @@ def robot_from_dict(document: dict[str, Any]) -> Robot:
     except ValidationError as error:
         raise from_validation(error, Robot) from None
     refuse_strange_keys(robot)
-    return robot
+    return with_spread(robot)
 
 
 def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Prior]) -> Any:

@@ -64,6 +64,15 @@ def _guesses(statement: Statement) -> str:
     return f"{', '.join(keys)} {are} of the robot file, and the model leaves something out: measure it{fit}"
 
 
+def _held(statement: Statement) -> str:
+    """The model does not follow, and the robot file gives numbers as exact."""
+    keys = statement.numbers["keys"]
+    free = " ".join(f"`free` {key}" for key in keys)
+    return (
+        f"the fit holds {', '.join(keys)}, which the robot file gives as exact: fit them too (`free` friction {free})"
+    )
+
+
 def _together(statement: Statement) -> str:
     """Pairs of numbers are strongly correlated, and wide for it."""
     numbers = statement.numbers
@@ -142,6 +151,7 @@ SENTENCES = {
         "let `ladder` fit the logs with each of the best causes, step by step: it keeps what predicts better"
     ),
     "guessed_numbers": Sentence(_guesses),
+    "held_numbers": Sentence(_held),
     "correlated_numbers": Sentence(_together),
     "wide_intervals": Sentence(_wide),
     "wide_by_misfit": Sentence(_wide_by_misfit),

@@ -181,3 +181,27 @@ def test_friction_of_other_shapes_is_its_level_along_each_axis():
 def test_whatever_the_robot_is_called(name):
     model, _ = loaded(ROBOT.replace(name=name))
     assert model.nu == 3
+
+
+def test_a_robot_that_holds_more_than_it_slides_by_is_said_to_slide_on_a_slope():
+    """MuJoCo has one level: between the two it slides, and the copy that is advised holds."""
+    robot = omnidyn.load_robot("axebot")
+    axes = robot.friction.axes
+    sticky = robot.replace(friction=robot.friction.replace(axes=axes.replace(breakaway=(4.4, 3.0, 0.2))))
+    (words,) = [words for words in mjcf(sticky).missing if "breakaway" in words]
+    assert "slides on a slope that the robot holds" in words
+    assert "coulomb raised to breakaway" in words
+    held = robot.replace(friction=robot.friction.replace(axes=axes.replace(coulomb=(4.4, 3.0, 0.2))))
+    assert slid(sticky, 0.8 * 4.4) > 0.05
+    assert slid(held, 0.8 * 4.4) < 1e-4
+
+
+def slid(robot, force):
+    """How far it is after 5 s on a slope that pulls by so much along x [m]."""
+    model = mujoco.MjModel.from_xml_string(mjcf(robot).text)
+    data = mujoco.MjData(model)
+    pull = force / robot.body.mass
+    model.opt.gravity[:] = pull, 0.0, -np.sqrt(9.81**2 - pull**2)
+    for _ in range(5000):
+        mujoco.mj_step(model, data)
+    return abs(data.qpos[0])

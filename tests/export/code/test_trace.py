@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from omnidyn.compiled.trace import TranslationError, inputs, scalar_function
+from omnidyn.compiled.scalar_function import scalar_function
+from omnidyn.compiled.trace import TranslationError, inputs
 from omnidyn.export.code.trace import statements
 
 

@@ -304,3 +304,11 @@ def test_the_package_starts_what_it_names(robot, tmp_path):
     if shutil.which("cmake"):
         here = ("controllers.yaml", "velocity_smoother.yaml", "robot.urdf", "bringup.launch.py")
         assert installed(tmp_path / "bot", tmp_path / "build") == {f"share/{name}/{file}" for file in here}
+
+
+def test_what_is_left_to_do_by_hand_stands_in_the_readme():
+    """Licence, maintainer and hardware: nobody else can put them in."""
+    text = ros2_control(omnidyn.load_robot("axebot")).files["README.md"]
+    by_hand = text[text.index("Left to do by hand") :]
+    for words in ("hardware plugin", "maintainer", "licence", "package.xml"):
+        assert words in by_hand

@@ -9,6 +9,8 @@ from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.prepare import expand_keys, free_by_default, guesses
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.validation import validate
+from omnidyn.logs.read_log import read_log
+from omnidyn.logs.run_file import write_run
 from omnidyn.model.deadzone import push_per_volt
 from omnidyn.model.dynamics import damping
 from omnidyn.model.first_guess import first_guess
@@ -143,6 +145,23 @@ def test_a_guess_that_is_held_is_named_where_the_model_misses_something(wrong, r
     fixed = identify(log, robot, OutputError(start="rest", nuisances=(), fixed=[RESISTANCE])).estimate
     assert "motor.gear_ratio" in fixed.value
     assert RESISTANCE not in fixed.value
+
+
+def test_what_is_asked_for_is_doubted_by_the_check_too(robot, tmp_path):
+    """A back-EMF that the logs contradict is no fault of theirs where the torque constant is fitted."""
+    exact, share = robot.replace(priors={}), 0.3
+    magnet = {name: share * getattr(robot.motor, name) for name in ("torque_constant", "emf_constant")}
+    run, _ = log_of(robot.replace(motor=robot.motor.replace(**magnet)), share)
+    log = read_log(write_run(run, tmp_path / "log.csv"), recorded=True)
+    assert "energy" in codes(identify(log, exact, OutputError(start="rest", nuisances=()), quick=True))
+    free = ("friction", "motor.torque_constant_Nm_A", RESISTANCE)
+    mended = identify(log, exact, OutputError(start="rest", nuisances=(), free=free), quick=True)
+    assert "energy" not in codes(mended)
+
+
+def codes(found):
+    """The errors of the logs behind an identification."""
+    return {finding.code for verdict in found.verdicts for finding in verdict.findings if finding.severity == "error"}
 
 
 def test_half_and_twice_of_a_guess_are_equally_far_from_it():

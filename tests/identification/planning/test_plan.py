@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import omnidyn
+from omnidyn.cli import main
 from omnidyn.identification.methods import OutputError
 from omnidyn.model.deadzone import axis_patterns
 from omnidyn.model.keys import BOX, Key
@@ -162,6 +163,27 @@ def test_the_command_writes_two_programs_that_simulate_reads(tmp_path):
     assert again[1] == 3
     assert "exists" in again[2]
     assert json.dumps(told)
+
+
+def test_identify_says_what_was_planned_and_what_it_got(tmp_path, capsys):
+    out, log = tmp_path / "plan.csv", tmp_path / "log.csv"
+    command("plan", "axebot", "--time", "30", "--noise", "twist=0.02,0.02,0.1", "-o", out)
+    run = omnidyn.simulate(AXEBOT, omnidyn.read_commands(out, 3).rows, dt=0.01)
+    rng = np.random.default_rng(5)
+    twist = run.twist + rng.normal(size=run.twist.shape) * NOISE["twist"]
+    omnidyn.write_run(omnidyn.Run(t=run.t, voltage=run.voltage, twist=twist), log)
+    words = ("identify", log, "--robot", "axebot", "--free", "friction", "--quick", "--planned", tmp_path / "plan.json")
+    said, code, err = command(*words, "--json")
+    assert code == 0, err
+    planned = said["planned"]
+    assert set(planned) == set(BOX)
+    # a dead band, which the fit doubts and the plan does not, widens what a level is within
+    assert all(0.75 < number["got"] / number["planned"] < 1.75 for number in planned.values())
+    assert main([str(word) for word in words]) == 0
+    assert "planned, got +- %" in capsys.readouterr().out
+    _, code, err = command(*words[:-1], out)
+    assert code == 3
+    assert "no plan in this file" in err
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import pytest
 import omnidyn
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.deadzone import breakaway_voltage
+from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.model.surroundings import GRAVITY, Floor
 from omnidyn.simulation.live import LiveRobot
@@ -96,6 +97,27 @@ def test_with_more_grip_than_is_asked_for_it_is_the_engine_of_wheels_that_roll(r
     assert np.abs(run.wheel_speed - plain.wheel_speed).max() * 0.035 < 2e-5
     np.testing.assert_allclose(run.current, plain.current, atol=2e-5)
     np.testing.assert_allclose(run.pose, plain.pose, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["axebot", "four-wheel", "mecanum"])
+@pytest.mark.parametrize("tol", [1e-3, 1e-5])
+def test_heavy_wheels_on_a_body_that_turns_easily_leave_rest_as_wheels_that_roll_do(name, tol):
+    """Forces of such wheels creep from round to round: a body that still rests then was taken to rest for good."""
+    robot = load_robot(name)
+    spin = 2.0 * robot.body.mass * float(np.mean(robot.wheels.radii)) ** 2
+    robot = robot.replace(
+        body=robot.body.replace(inertia=1e-2 * robot.body.inertia),
+        wheels=robot.wheels.replace(wheel_inertia=spin),
+        friction=Friction(
+            direction=DirectionFriction(coulomb=(2.0, 2.0), viscous=0.5, yaw_coulomb=0.1, yaw_viscous=0.01)
+        ),
+    )
+    u = levels(robot, 3, 12)
+    rolls = omnidyn.simulate(robot, u, 0.1, tol=1e-7)
+    grips = omnidyn.simulate(robot.replace(wheels=robot.wheels.replace(traction_mu=100.0)), u, 0.1, tol=tol)
+    assert np.abs(rolls.twist[-1]).max() > 0.1
+    assert (np.abs(grips.twist - rolls.twist) / [1.0, 1.0, 10.0]).max() < 2.0 * tol
+    assert np.array_equal(grips.twist == 0.0, rolls.twist == 0.0)
 
 
 def test_within_the_dead_zone_it_rests_exactly():

@@ -32,6 +32,7 @@ PLAIN_OPTIONS = (
     "noise",
     "path",
     "plant",
+    "planned",
     "pose",
     "rate",
     "repair",

@@ -20,7 +20,7 @@ from omnidyn.export.bodies.links import joint_names
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.feedforward.gains import gains
-from omnidyn.export.ros.package import package, package_name, read_me
+from omnidyn.export.ros.package import by_hand, package, package_name, read_me
 from omnidyn.export.ros.path_node import BUILD, NODE_END, NUMBERS, SETUP, follower
 from omnidyn.export.ros.ros2_control import HEADROOM, limits
 from omnidyn.export.spelling import filled, number, python_comment
@@ -109,6 +109,7 @@ def _sections(name: str, topic: str, joints: Sequence[str], follows: bool) -> li
         f"It takes {heard}, and publishes `/{topic}` (std_msgs/Float64MultiArray): a number for each wheel, in the "
         f"order {listed}. A controller of ROS that takes these, such as JointGroupVelocityController, listens on "
         f"`/CONTROLLER/commands`: remap `{topic}` to it in the launch file.",
+        by_hand("the driver of your motors: what takes these numbers, and publishes what the node listens to"),
     ]
 
 

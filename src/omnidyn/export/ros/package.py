@@ -77,6 +77,17 @@ def package(
 _ALWAYS = ("launch", "launch_ros", "ros2launch")
 
 
+BY_HAND = (
+    "the maintainer: your name and address, in `package.xml`",
+    "the licence: its name in `package.xml`, its text in a file LICENSE",
+)
+
+
+def by_hand(*more: str) -> str:
+    """What is left to whoever takes a package, as Markdown. more: beside what all packages need."""
+    return "Left to do by hand:\n\n" + "\n".join(f"- {line}" for line in (*more, *BY_HAND))
+
+
 def read_me(title: str, about: Sequence[str], sections: Sequence[str]) -> str:
     """README.md: a title, points, then paragraphs of Markdown. A robot's name is text in it, whatever it holds."""
     points = "\n".join(f"- {plain(line)}" for line in about)

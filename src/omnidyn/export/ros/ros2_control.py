@@ -19,7 +19,7 @@ from omnidyn.export.features import left_out, refuse
 from omnidyn.export.feedforward.gains import axis_gains
 from omnidyn.export.ros.drive_controller import DriveController, drive_controller
 from omnidyn.export.ros.odometry_covariance import Covariance, covariance
-from omnidyn.export.ros.package import package, package_name, read_me
+from omnidyn.export.ros.package import by_hand, package, package_name, read_me
 from omnidyn.export.spelling import filled, hash_comment, python_comment, yaml_number
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
@@ -182,7 +182,10 @@ def _sections(robot: Robot, name: str, controller: DriveController, joints: Sequ
         "Drive it by stamped twists on `/cmd_vel`:",
         "    ros2 topic pub -r 20 /cmd_vel geometry_msgs/msg/TwistStamped '{twist: {linear: {x: 0.2}}}'",
         f"The smoother sends them on to `{controller.command}`; odometry comes on `{controller.odometry}`.",
-        "The plugin in `robot.urdf` is `mock_components/GenericSystem`: joints do what they are told. Put in that of "
-        "your hardware. It takes and gives speeds of the joints [rad/s], positive about these axes:",
+        by_hand(
+            "the hardware plugin: `robot.urdf` names `mock_components/GenericSystem`, whose joints do what they are "
+            "told; put in that of your hardware"
+        ),
+        "The hardware plugin takes and gives speeds of the joints [rad/s], positive about these axes:",
         f"| wheel | joint | azimuth [degree] | axis of the joint points |\n| --- | --- | --- | --- |\n{rows}",
     ]

@@ -224,6 +224,18 @@ def rim_speed(element, at, line, tau, rate, goal):
 
 
 @part
+def rim_force(element, at, line, tau, spin, before, p):
+    """(what a wheel that grips pushes the body with while the ground under it runs at p, not 0; its slope).
+
+    Others as of `wheel_answer`.
+    """
+    side = 1.0 if p > 0.0 else -1.0
+    level = at.hold[0] if side > 0.0 else -at.hold[1]
+    drive, slope = _drive(element, at, line, tau, side, p)
+    return drive - level - spin / tau * (p - before), slope - spin / tau
+
+
+@part
 def wheel_answer(element, at, line, tau, spin, before, ground, limit):
     """(force on the body f [N], rim speed s [m/s], sign of s, contact: GRIPS, or the side to which it spins).
 

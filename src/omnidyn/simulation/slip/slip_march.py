@@ -58,8 +58,8 @@ class SlipState(NamedTuple):
 
 class SlipWorkspace(NamedTuple):
     """What a run works in: the state of now, those after a whole step, one and two half steps, and of a stage its parts
-    as of model/layout.py, motors as `lines` (n,) of LINE, the wrench `pull` (3,), the goal x* (3 + n,), `space` (12,);
-    counts: most sweeps, steps."""
+    as of model/layout.py, motors as `lines` (n,) of LINE, the wrench `pull` (3,), the goal x* (3 + n,), `space` (12,),
+    `law` (2, 3, 4); counts: most sweeps, steps."""
 
     now: SlipState
     whole: SlipState
@@ -70,6 +70,7 @@ class SlipWorkspace(NamedTuple):
     pull: FloatArray
     goal: FloatArray
     space: FloatArray
+    law: FloatArray
     counts: IntArray
 
 
@@ -140,7 +141,7 @@ def _room(plant: SlipPlant) -> SlipWorkspace:
     n = len(plant.spin)
     now, whole_step, middle, two = (SlipState(np.zeros(3 + n), np.zeros(5 + n, SLIP_EACH)) for _ in range(4))
     stage = new_stage(Plant(plant.body, plant.element[None]))
-    space = np.zeros(3), np.zeros(3 + n), np.zeros(12), np.zeros(2, np.int64)
+    space = np.zeros(3), np.zeros(3 + n), np.zeros(12), np.zeros((2, 3, 4)), np.zeros(2, np.int64)
     return SlipWorkspace(now, whole_step, middle, two, stage, np.zeros(n, LINE), *space)
 
 

@@ -6,8 +6,8 @@ Each wheel, each axis and the ellipse is a block with one exact answer, given th
 body.py). With loads that do not depend on the motion all of it is the minimum of a convex function, to which the blocks
 lead from anywhere; bristles of a vector are near one, and a block that misses its answer is seen. What a centre of mass
 beside that of the wheels couples counts as a force, like that of the turning frame: from sweep to sweep it is off by
-c/sqrt(I/M + c^2) of what it was. Steps are SDIRK2, as in implicit/step.py; friction holds exactly: what rests has a
-speed of literal 0.
+c/sqrt(I/M + c^2) of what it was. Where sweeps are slow, a leap (leap.py) brings them near. Steps are SDIRK2, as in
+implicit/step.py; friction holds exactly: what rests has a speed of literal 0.
 """
 
 from __future__ import annotations
@@ -20,10 +20,20 @@ from omnidyn.model.layout import Plant
 from omnidyn.model.stick_slip.forces import aim_bristles, keep_bristles
 from omnidyn.model.stick_slip.plant import copy_row
 from omnidyn.simulation.implicit.step import BACK, GAMMA, STIFF
-from omnidyn.simulation.slip.body import GRIPS, body_blocks, current_at, plane_block, set_line, wheel_answer
+from omnidyn.simulation.slip.body import (
+    GRIPS,
+    body_blocks,
+    current_at,
+    plane_block,
+    set_line,
+    wheel_answer,
+)
+from omnidyn.simulation.slip.leap import leap
 
 SWEEPS = 4000
+FIRST_LEAP, LEAPS = 3, 4  # leaps in a row, from this sweep on; then from twice as late each time
 SPEED_TOLERANCE = 2e-15  # of the speeds at hand: a change that is rounding
+CREEP_TOLERANCE = 3e-14  # of the momentum at hand: a change of force that is rounding
 
 
 @part
@@ -43,27 +53,42 @@ def _frame(plant, tau, goal, v, total, frame):
 
 
 @part
+def _begin(plant, stage, room, element_states):
+    """What the forces of a first guess sum up to, what of it does not change, and the currents over the stage."""
+    n, tau, space = len(plant.spin), stage.task.tau, room.space
+    heavy, total, frame, offset = space[:3], space[3:6], space[6:9], space[9:12]
+    for a in range(3):
+        heavy[a] = plant.mass[a] / tau + plant.element[a].viscous
+        offset[a] = plant.mass[a] / tau * room.goal[a] + room.pull[a]
+        total[a] = offset[a] + element_states[a].force
+        frame[a] = 0.0
+    total[0], total[1] = total[0] + element_states[3 + n].force, total[1] + element_states[4 + n].force
+    for w in range(n):
+        set_line(room.lines[w], plant.element[3 + w], stage.each[3 + w], tau)
+        for a in range(3):
+            total[a] += plant.g[w, a] * element_states[3 + w].force
+
+
+@part
 def solve_stage(plant, stage, start, room, x, element_states):
     """Solve a stage in place. x (3 + n,): twist, rim speeds, at first a guess. start: x of before the step.
 
     room: its goal is x*, its pull the wrench on the body. element_states: of a SlipState; its forces are a first guess
     too. Returns the number of sweeps.
     """
-    goal, pull, space, lines = room.goal, room.pull, room.space, room.lines
+    goal, space, lines = room.goal, room.space, room.lines
     n, heavy, total, frame, offset = len(plant.spin), space[:3], space[3:6], space[6:9], space[9:12]
     tau, falls, bends = stage.task.tau, plant.steep > 0.0, plant.body[0].stiffness > 0.0
-    for a in range(3):
-        heavy[a] = plant.mass[a] / tau + plant.element[a].viscous
-        offset[a] = plant.mass[a] / tau * goal[a] + pull[a]
-        total[a] = offset[a] + element_states[a].force
-        frame[a] = 0.0
-    total[0], total[1] = total[0] + element_states[3 + n].force, total[1] + element_states[4 + n].force
-    for w in range(n):
-        set_line(lines[w], plant.element[3 + w], stage.each[3 + w], tau)
-        for a in range(3):
-            total[a] += plant.g[w, a] * element_states[3 + w].force
+    leaps = not bends and plant.gaps == 0.0  # what a leap's rounding moves off breakaway would slide
+    _begin(plant, stage, room, element_states)
+    next_leap = FIRST_LEAP
     for sweep in range(SWEEPS):
-        worst, size, loads = 0.0, 0.0, 0.0  # loads: forces of which what is left is the rounding
+        # loads: forces of which what is left is the rounding; creep: how far those of wheels still move a body at rest
+        worst, size, loads, creep, rests = 0.0, 0.0, 0.0, 0.0, False
+        if sweep >= next_leap and leaps:
+            leap(plant, stage, room, element_states)
+            if sweep == next_leap + LEAPS - 1:
+                next_leap *= 2
         v0, v1, v2 = total[0] / heavy[0], total[1] / heavy[1], total[2] / heavy[2]
         _frame(plant, tau, goal, (v0, v1, v2), total, frame)
         for w in range(n):
@@ -82,6 +107,7 @@ def solve_stage(plant, stage, start, room, x, element_states):
             )
             for a in range(3):
                 total[a] += plant.g[w, a] * (f - wheel_state.force)
+            creep = max(creep, abs(f - wheel_state.force))
             wheel_state.force, x[3 + w], loads = f, s, loads + abs(f)
             wheel_state.sign, wheel_state.contact = sign, contact
         if bends:
@@ -91,11 +117,13 @@ def solve_stage(plant, stage, start, room, x, element_states):
             now, was = total[a] / heavy[a], (v0 if a == 0 else (v1 if a == 1 else v2))
             reach = math.sqrt(plant.mass[a] / plant.mass[0])  # yaw as a length
             worst, size = max(worst, reach * abs(now - was)), max(size, reach * (abs(now) + abs(goal[a])))
-            x[a] = now
+            x[a], rests = now, rests or now == 0.0
         size += loads / (heavy[0] + heavy[1])
         if falls:
             worst = max(worst, follow_speeds(plant, stage, x, element_states) / (heavy[0] + heavy[1]))
         solved = worst <= SPEED_TOLERANCE * size or (worst == 0.0 and sweep > 0)
+        if rests:
+            solved &= creep <= CREEP_TOLERANCE * size * (heavy[0] + heavy[1])
         if solved and (falls or plant.gaps != 0.0):
             settle_rest(plant, stage, x, element_states)
         if solved and (plant.gaps == 0.0 or not give_way(plant, stage, start, x, element_states)):
