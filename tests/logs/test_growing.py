@@ -59,6 +59,6 @@ def test_headings_go_on_over_whole_turns(table):
 
 def test_what_is_no_table_is_refused(table):
     with pytest.raises(omnidyn.OmnidynError, match=r"log\.csv"):
-        table.feed("hello\n" * (FIRST_ROWS + 5))
+        table.feed("".join(f"hello {k}\n" for k in range(FIRST_ROWS + 5)))
     with pytest.raises(omnidyn.OmnidynError, match=r"a line does not end; got .*; expected rows of text"):
         GrowingTable("pipe").feed("1" * (2 << 20))
