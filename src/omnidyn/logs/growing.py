@@ -81,9 +81,12 @@ class GrowingTable:
             path.write_text("\n".join([self._head] * self.options.header + lines) + "\n", encoding="utf-8")
             try:
                 table = read_table(path, **self.options.of_tables)
-            except InputError:
+            except InputError as error:
                 if self.columns is None:
-                    raise
+                    place = error.where.replace(str(path), self.source)
+                    raise InputError(
+                        error.what, got=error.got, expected=error.expected, remedy=error.remedy, where=place
+                    ) from None
                 self.bad_rows += len(lines)
                 return None
         return replace(table, source=self.source)
