@@ -52,6 +52,7 @@ NAMES = {
     "group_shapes": "a shape of friction per group, a level of each wheel: taken where it is so only (half an hour)",
     "selection": "the rule of selection beside those before it: useless numbers taken, effects found (a minute)",
     "plans": "a planned minute of driving beside others, inside its room, and as sure as predicted (minutes)",
+    "live": "numbers while a robot drives: coverage, the whole fit, false enough beside PX4 and WPILib (12 minutes)",
     "studies": "intervals and false alarms over many draws: breakaway, laws, rounding, noise, motors (15 minutes)",
     "ordinary": "robots as people have them: one evaluation, a run, whole fits, beside goals (ten minutes)",
     # real

@@ -79,7 +79,7 @@ def _measure_robot(table: Table, robot: Robot, parts: Sequence[str], folder: Pat
     paths = [folder / f"{robot.name}_{seed}.csv" for seed in (1, 2)]
     share = float(np.mean([write_log(robot, seed, path) for seed, path in zip((1, 2), paths, strict=True)]))
     file = folder / f"{robot.name}.toml"
-    _initial(robot, file)
+    initial(robot, file)
     has_goal = robot.name != EXCEPTION
     model, assume = load_robot(file), dict(fact.split("=", 1) for fact in robot.facts[1:])
     runs = [read_log(path, model, assume=assume) for path in paths]
@@ -122,7 +122,7 @@ def _measure_robot(table: Table, robot: Robot, parts: Sequence[str], folder: Pat
         table.add(robot=robot.name, what="mujoco.sysid", cpu=cpu, unit="s", note=words)
 
 
-def _initial(robot: Robot, file: Path) -> None:
+def initial(robot: Robot, file: Path) -> None:
     """What `omnidyn init` makes of a ruler and a scale; with friction at the wheels where that is the exception."""
     options = [word for word in robot.init if word not in ("--friction", "wheels")]
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):

@@ -30,6 +30,7 @@ _HOME = {
     "Comparison": "omnidyn.comparison.result",
     "Estimate": "omnidyn.identification.estimate",
     "Identification": "omnidyn.identification.identification",
+    "Live": "omnidyn.identification.live.live",
     "MotorFit": "omnidyn.identification.methods",
     "MotorLine": "omnidyn.identification.methods",
     "OmnidynError": "omnidyn.errors",
@@ -93,6 +94,7 @@ if TYPE_CHECKING:
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.identification import Identification
     from omnidyn.identification.identify import identify
+    from omnidyn.identification.live.live import Live
     from omnidyn.identification.methods import MotorFit, MotorLine, OutputError, SteadyState
     from omnidyn.identification.planning.plan import plan
     from omnidyn.logs.command_file import read_commands

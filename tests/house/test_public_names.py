@@ -11,6 +11,7 @@ PUBLIC = [
     "Comparison",
     "Estimate",
     "Identification",
+    "Live",
     "MotorFit",
     "MotorLine",
     "OmnidynError",

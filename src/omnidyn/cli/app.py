@@ -25,6 +25,7 @@ from omnidyn.cli import (
     simulate,
     sweep,
     warm,
+    watch,
 )
 from omnidyn.cli.terminal.help import Grouped
 from omnidyn.cli.terminal.session import provenance, robot_input
@@ -101,6 +102,7 @@ for _command in (
     init.init,
     check.check,
     plan.plan,
+    watch.watch,
     logs.align,
     simulate.simulate,
     identify.identify,

@@ -7,7 +7,7 @@ identification all of it, verdict what it came to, log_verdicts what `check` say
 selection/ says whether one more effect predicts held-out blocks better. Then structure/ (is the model right? its
 answers: lack_of_fit, stability), validation (free runs beside the logs), force_scale (what no log can correct),
 friction_curve (force against speed), ladder (its steps as values), advice (what to do next), and fit_document (all of
-it as tables and words). planning/ says which experiment tells most. first_runs makes whatever the compiler is needed
-for.
+it as tables and words). planning/ says which experiment tells most, live/ what a log
+tells while it grows. first_runs makes whatever the compiler is needed for.
 fingerprints: whether two logs are one recording.
 """

@@ -8,6 +8,7 @@ fixed form: run_file, mcap_run, command_file, steady_table, motor_table.
 Words: a segment lies between two gaps in time, a hold is a stretch over which the commands stand still, a plateau a
 steady window as one point, a window so many rows or seconds; a block is a part of a long file, read at once. Readers
 leave notes (what was decided) and doubts (what was left open); a Run and an Estimate carry them as warnings.
+growing: a text file that is still being written.
 cdr: messages of ROS 2 as bytes.
 joined_files: several files as one table.
 window_means: speeds that are means over a window.

@@ -36,6 +36,7 @@ ROOMS = (
     "motors",
     "steady",
     "lines",
+    "live",
 )
 
 

@@ -39,6 +39,16 @@ def test_a_log_with_gaps_is_split_and_each_piece_starts_where_it_starts(axebot, 
     assert fit.covariance == "white"  # a piece that starts wrong would leave a tail
 
 
+def test_a_last_row_without_inputs_says_nothing_of_a_latency(axebot, clean):
+    """Nothing follows it, so that it needs none; its slope by a latency was no number, and the fit broke."""
+    log = noisy(clean, 2)
+    voltage = log.voltage.copy()
+    voltage[-1] = np.nan
+    assert holds(
+        identify(log.replace(voltage=voltage), axebot, OutputError(nuisances=("latency",)), quick=True).estimate
+    )
+
+
 def test_rows_without_input_split_the_log_too(axebot, clean):
     log = noisy(clean, 2)
     voltage = log.voltage.copy()

@@ -126,6 +126,11 @@ def to_json(document: Any) -> str:
     return json.dumps(plain(document), indent=2, ensure_ascii=False, allow_nan=False)
 
 
+def show_line(document: dict[str, Any]) -> None:
+    """One of many results for machines, each on a line of its own, to stdout."""
+    show(json.dumps(plain(document), ensure_ascii=False, allow_nan=False))
+
+
 def width() -> int:
     """Columns to write in: of the terminal or COLUMNS, at least 20; without a terminal a wide page."""
     return max(MIN_WIDTH, shutil.get_terminal_size((WIDTH_WITHOUT_TERMINAL, 24)).columns)

@@ -279,9 +279,10 @@ def put_row(row, c, v, s, dv, ds, speed_map, travel_map, d_speed, d_travel, vary
 
 @part
 def add_latency(row, c, latency_index, v, s, g, law, speed_map, travel_map, place):
-    """The slope of column c by its latency: what was earlier."""
+    """The slope of column c by its latency: what was earlier. In a last row without inputs no acceleration is known."""
     for axis in range(3):
         pace = acceleration_at_end(v[axis], g[axis], law[1, axis], law[2, axis], law[0, axis])
+        pace = pace if g[axis] == g[axis] else 0.0
         row[latency_index] -= speed_map[c, axis] * pace + travel_map[c, axis] * v[axis]
     if place is not None:
         east, north = rotated(s[2], v[0], v[1])
@@ -371,6 +372,8 @@ def march(
                 if t[sample] - t[first] < margin[groups[group]] or (early and not begins_at_rest):
                     continue
                 time_in_row = max(time_in_row, 0.0)
+                if time_in_row > 0.0 and g[0] + g[1] + g[2] != g[0] + g[1] + g[2]:
+                    continue  # what follows a last row without inputs
                 copy_motion(v, s, dv, ds, v_now, s_now, dv_now, ds_now, travels, place)
                 if time_in_row > 0.0:
                     advance(

@@ -1,0 +1,187 @@
+"""omnidyn watch SOURCE: what a log tells while it grows."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import sys
+import time
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import omnidyn
+from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
+from omnidyn.cli.terminal.session import provenance, robot_input
+from omnidyn.cli.terminal.streams import say, show, show_line
+from omnidyn.cli.terminal.telling import end_failed, tell
+from omnidyn.document import sentence
+from omnidyn.errors import InputError
+from omnidyn.files import format_of, open_regular
+
+if TYPE_CHECKING:
+    from omnidyn.identification.live.status import LiveStatus
+    from omnidyn.run import Run
+
+STDIN, UDP = "-", "udp:"
+PAUSE = 0.1  # [s] between two looks at a source
+MOST_BYTES, TAIL = 1 << 20, 256  # read at once; kept, to know a file again
+
+
+@reads_logs("sort", "rate", "var", "skip_bad_rows", "latency")
+def watch(
+    source: str = typer.Argument(
+        metavar="SOURCE", help="A text file that grows, - for standard input, or udp:PORT, udp:ADDRESS:PORT."
+    ),
+    robot: str = typer.Option(..., "--robot", metavar="ROBOT", help="A preset (see: omnidyn robots) or a robot file."),
+    free: Annotated[
+        list[str] | None,
+        typer.Option("--free", metavar="KEY", help="What is to be learnt; default: friction and resistance."),
+    ] = None,
+    within: float = typer.Option(10.0, metavar="%", help="Half an interval that is enough, of each number."),
+    reference: str = typer.Option("", metavar="FIT", help="A fit before: say what differs, as floor, payload, wear."),
+    idle: float = typer.Option(0.0, metavar="S", help="End after so long without a row; default: wait for more."),
+    until_enough: bool = typer.Option(False, "--until-enough", help="End as soon as it is enough."),
+    flags: LogFlags = NO_FLAGS,
+    json: bool = typer.Option(False, "--json", help="A line of JSON each second."),
+) -> None:
+    """Say each second what a log tells while it grows: numbers, intervals, and whether that is enough.
+
+    Ctrl-C, the end of the input or --idle end it; then all numbers are shown. Gaps, restarts and lines that are no rows
+    are survived, and said. Exit code 4 where it ends before it is enough.
+    """
+    from omnidyn.identification.live.live import Live
+    from omnidyn.identification.methods import OutputError
+    from omnidyn.logs.growing import GrowingTable
+
+    _refuse_range("--within", within, "%")
+    _refuse_range("--idle", idle or 1.0, "s")
+    given, maps = omnidyn.load_robot(robot), flags.maps(force=False)
+    before = omnidyn.load_robot(reference) if reference else None
+    method = OutputError(free=tuple(free), nuisances=("latency", "push")) if free else None
+    live = Live(given, method, within=within / 100.0, reference=before)
+    table = GrowingTable(source, given, flags.options())
+
+    def is_over(runs: list[Run]) -> bool:
+        """Take runs, and tell each second of them; whether that is enough, and all that was asked for."""
+        for run in runs:
+            for status in live.answers(run):
+                _tell(status, json)
+                if until_enough and status.is_enough:
+                    return True
+        return False
+
+    try:
+        for text in _texts(source, idle):
+            if text is None:
+                say(f"omnidyn: warning: {source} was written anew: read from its start")
+                table.begin_anew()
+                continue
+            is_first, runs = table.columns is None, table.feed(text)
+            if is_first and table.columns is not None:
+                maps.show(source, table.columns)
+            if is_over(runs):
+                break
+        else:
+            is_over(table.end())
+    except KeyboardInterrupt:
+        say("omnidyn: ended")
+    if table.bad_rows:
+        say(f"omnidyn: warning: {table.bad_rows} lines held no row and were left out")
+    status = live.status
+    if not json:
+        tell(status.document(), False, provenance([robot_input(robot)]))
+    if not status.is_enough:
+        end_failed(status.verdict)
+
+
+def _tell(status: LiveStatus, json: bool) -> None:
+    """The answer of a second, on a line."""
+    if json:
+        show_line(status.to_dict() | {"verdict": sentence(str(status.verdict))})
+        return
+    show(f"{status.seconds:6.0f} s  {sentence(str(status.verdict))}")
+    for change in status.changes:
+        show(f"{'':10s}{sentence(str(change))}")
+
+
+def _texts(source: str, idle: float) -> Iterator[str | None]:
+    """What comes, as text, "" where nothing does; None where a file was written anew. Ends with its source, or after
+    `idle` seconds of silence."""
+    last = time.monotonic()
+    for data in _bytes(source):
+        if data == b"" and idle and time.monotonic() - last > idle:
+            return
+        yield data if data is None else data.decode("utf-8", errors="replace")
+        last = last if data == b"" else time.monotonic()  # what was done with it is no silence
+
+
+def _bytes(source: str) -> Iterator[bytes | None]:
+    if source == STDIN:
+        return _of_stdin()
+    return _of_socket(source) if source.startswith(UDP) else _of_file(source)
+
+
+def _of_stdin() -> Iterator[bytes]:
+    number = sys.stdin.fileno()
+    while data := os.read(number, MOST_BYTES):
+        yield data
+
+
+def _of_file(path: str) -> Iterator[bytes | None]:
+    """What a file grows by; one that no longer ends as it did where it was read to is read from its start."""
+    with open_regular(path):
+        pass
+    kind = format_of(path)
+    if kind is not None:
+        raise InputError(
+            "only text can be read while it grows",
+            got=kind.name,
+            expected="a text file such as CSV, - or udp:PORT",
+            remedy="fit the whole file with identify, or let the logger write text too",
+            where=path,
+        )
+    place, before = 0, b""  # how far it was read, and the last bytes there
+    while True:
+        try:
+            with open(path, "rb") as file:
+                file.seek(place - len(before))
+                is_same = file.read(len(before)) == before
+                data = file.read(MOST_BYTES) if is_same else b""
+        except OSError:  # between two files of one name
+            is_same, data = True, b""
+        if not is_same:
+            place, before = 0, b""
+            yield None
+            continue
+        place, before = place + len(data), (before + data)[-TAIL:]
+        yield data
+        if not data:
+            time.sleep(PAUSE)
+
+
+def _of_socket(source: str) -> Iterator[bytes]:
+    """Datagrams with one or more lines each."""
+    address, _, port = source[len(UDP) :].rpartition(":")
+    if not port.isdigit() or not 0 < int(port) < 65536:
+        raise InputError("not a port", got=source, expected="udp:PORT or udp:ADDRESS:PORT", where="SOURCE")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        try:
+            receiver.bind((address or "127.0.0.1", int(port)))
+        except OSError as error:
+            raise InputError(
+                "cannot listen", got=f"{source}: {error.strerror or error}", expected="a free port of this machine",
+                remedy="take another port, or the address of this machine that the robot sends to", where="SOURCE",
+            ) from None  # fmt: skip
+        say(f"omnidyn: listening at {':'.join(map(str, receiver.getsockname()))}")
+        while True:
+            ready, _, _ = select.select([receiver], [], [], PAUSE)
+            data = receiver.recv(65536) if ready else b""
+            yield data if not data or data.endswith(b"\n") else data + b"\n"
+
+
+def _refuse_range(option: str, value: float, unit: str) -> None:
+    if not 0.0 < value < 1e6:
+        raise InputError("out of range", got=f"{value:g}", expected=f"above 0 {unit}", where=option)

@@ -1,0 +1,46 @@
+"""What is said of a drive while it lasts."""
+
+from __future__ import annotations
+
+from omnidyn.document import all_of
+from omnidyn.model.keys import in_words
+from omnidyn.statement import Statement
+from omnidyn.telling.sentence import Sentence
+
+LOOKS_LIKE = {"floor": "another floor", "payload": "another payload", "wear": "wear, or a part that was changed"}
+
+
+def _not_yet(statement: Statement) -> str:
+    """How many numbers are known, and which one is missing most."""
+    numbers = statement.numbers
+    width = "unknown" if numbers["half"] is None else f"within {100.0 * numbers['half']:.2g} %"
+    words = f"not yet: after {numbers['seconds']:.0f} s {numbers['known']} of {numbers['count']} numbers are known"
+    return f"{words}; {in_words(numbers['widest'])} is {width}, wanted {100.0 * numbers['within']:.2g} %"
+
+
+def _not_predicted(statement: Statement) -> str:
+    """All numbers are known, but no stretch has shown it."""
+    numbers = statement.numbers
+    if numbers["missed"]:
+        return f"not yet: the numbers are known, but do not predict {all_of(numbers['missed'])} of the last stretch"
+    return "not yet: the numbers are known, and wait for a stretch of driving that they predict"
+
+
+def _changed(statement: Statement) -> str:
+    """What changed since a fit, and what that looks like."""
+    pairs = zip(statement.numbers["keys"], statement.numbers["shares"], strict=True)
+    words = all_of([f"{in_words(key)} {100.0 * share:+.0f} %" for key, share in pairs])
+    return f"this looks like {LOOKS_LIKE[statement.subject]}: {words} beside the fit before"
+
+
+SENTENCES = {
+    "live_waiting": Sentence("no numbers yet after {seconds:.0f} s: {why}"),
+    "live_not_yet": Sentence(_not_yet),
+    "live_not_predicted": Sentence(_not_predicted, "drive on; where it stays so, fit the log with identify"),
+    "live_enough": Sentence(
+        "enough: after {at:.0f} s all numbers are known, and a stretch that was held out was predicted"
+    ),
+    "live_changed": Sentence(_changed, "stop, and look; drive a new log where the change is meant to stay"),
+    "live_restarts": Sentence("time began anew {restarts} times: what followed counts on"),
+    "live_gap": Sentence("rows are missing for up to {gap:.1f} s: the motion in them is not used"),
+}

@@ -1,0 +1,186 @@
+"""Live: what a log tells while it grows, against the truth and against the fit of the whole log."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import omnidyn
+from omnidyn.identification.live.rows import Rows, part
+from omnidyn.identification.output_error.fit import Fit
+from omnidyn.model.keys import BOX
+from tests.support.axebot_logs import NOISE, TRUTH, coloured, noisy, voltages, with_friction
+
+SECONDS = 30.0
+ROBOT = omnidyn.load_robot("axebot")
+WRONG = with_friction(ROBOT, [2.0 * value for value in TRUTH.values()])
+
+
+def fed(log, live=None, rows=37):
+    live = live or omnidyn.Live(WRONG)
+    for first in range(0, len(log), rows):
+        live.add(part(log, first, min(first + rows, len(log))))
+    return live
+
+
+@pytest.fixture(scope="module")
+def exact():
+    return omnidyn.simulate(ROBOT, voltages(np.random.default_rng(3), SECONDS), 0.01)
+
+
+@pytest.fixture(scope="module")
+def log(exact):
+    return noisy(exact, 1)
+
+
+@pytest.fixture(scope="module")
+def live(log):
+    return fed(log)
+
+
+def test_numbers_are_those_of_the_fit_of_the_whole_log(live, log):
+    fit = Fit.of([log], WRONG, live.method)
+    solution = fit.weighed(fit.solve()).solution
+    whole = dict(zip(solution.solver.problem.names, solution.state.point.values.tolist(), strict=True))
+    for name, number in live.status.numbers.items():
+        assert abs(number.value - whole[name]) < 0.3 * number.std, name
+
+
+def test_intervals_hold_the_truth_with_a_start_twice_wrong(live):
+    for name in BOX:
+        number = live.status.numbers[name]
+        assert abs(number.value - TRUTH[name]) < 3.0 * number.std
+        assert number.std < 0.1 * TRUTH[name]
+
+
+def test_errors_that_remember_are_whitened(exact, live):
+    status = fed(coloured(exact, 2)).status
+    z = [(status.numbers[name].value - TRUTH[name]) / status.numbers[name].std for name in BOX]
+    assert np.abs(z).max() < 3.5
+    assert status.numbers[BOX[3]].std > 1.5 * live.status.numbers[BOX[3]].std  # such noise tells less
+
+
+def test_an_independent_simulator_agrees():
+    """The equation of the paper by solve_ivp, sgn by tanh over 0.1 mm/s: no code of omnidyn makes the truth."""
+    rate, seconds = 100.0, 20.0
+    volts = voltages(np.random.default_rng(8), seconds)
+    mass, viscous, level = np.array([1.5, 1.5, 0.025]), np.array(list(TRUTH.values())[:3]), np.array([2.2, 1.5, 0.099])
+    azimuth = np.deg2rad([180.0, -60.0, 60.0])
+    wrench = np.stack([-np.sin(azimuth), np.cos(azimuth), np.full(3, 0.1)])
+    k = 19.0 * 0.0059 / 0.035
+
+    def rate_of(t, v, u):
+        force = wrench @ (k * (u - k * wrench.T @ v) / 1.69)
+        return (force - viscous * v - level * np.tanh(v / np.array([1e-4, 1e-4, 1e-3]))) / mass
+
+    v, twist = np.zeros(3), [np.zeros(3)]
+    for u in volts:
+        v = solve_ivp(rate_of, (0.0, 1.0 / rate), v, "LSODA", args=(u,), rtol=1e-6, atol=1e-8).y[:, -1]
+        twist.append(v)
+    noise = np.random.default_rng(9).normal(size=(len(twist), 3)) * NOISE
+    log = omnidyn.Run(
+        t=np.arange(len(twist)) / rate, voltage=np.concatenate([volts, volts[-1:]]), twist=np.array(twist) + noise
+    )
+    numbers = fed(log).status.numbers
+    assert max(abs(numbers[name].value - TRUTH[name]) / numbers[name].std for name in BOX) < 3.5
+
+
+def test_enough_needs_intervals_and_a_stretch_that_was_predicted(log):
+    live, at = omnidyn.Live(WRONG, within=0.3), None
+    for first in range(0, len(log), 100):
+        status = live.add(part(log, first, first + 100))
+        if at is None and status.is_enough:
+            at = status
+    assert at is not None
+    assert at.held_out.predicted
+    assert not at.missing
+    assert at.held_out.end - at.held_out.start == pytest.approx(5.0, abs=0.05)
+    strict = fed(log, omnidyn.Live(WRONG, within=1e-3)).status
+    assert not strict.is_enough
+    assert strict.verdict.code == "live_not_yet"
+
+
+def test_numbers_that_do_not_predict_are_not_enough(exact):
+    """The floor changes while nobody looks: the stretch after it is not predicted."""
+    other = with_friction(ROBOT, [2.0 * value for value in TRUTH.values()])
+    volts = voltages(np.random.default_rng(4), 10.0)
+    first, second = noisy(exact, 1), noisy(omnidyn.simulate(other, volts, 0.01), 2)
+    live = fed(part(first, 0, 2000), omnidyn.Live(WRONG, within=0.01))
+    live.add(second.replace(t=second.t + 20.5))
+    assert live.status.held_out.missed
+
+
+def test_the_floor_that_changed_is_said():
+    fit = omnidyn.identify(
+        noisy(omnidyn.simulate(ROBOT, voltages(np.random.default_rng(5)), 0.01), 5), ROBOT, quick=True
+    )
+    reference = next(iter(fit.groups.values())).robot
+    rough = with_friction(ROBOT, [0.94, 0.96, 0.01, 1.5 * 2.2, 1.5 * 1.5, 1.5 * 0.099])
+    heavy = ROBOT.replace(body=ROBOT.body.replace(mass=2.5, inertia=0.045))
+    volts = voltages(np.random.default_rng(6), 25.0)
+    kinds = {}
+    for name, robot in (("same", ROBOT), ("floor", rough), ("payload", heavy)):
+        status = fed(noisy(omnidyn.simulate(robot, volts, 0.01), 7), omnidyn.Live(ROBOT, reference=reference)).status
+        kinds[name] = {change.subject for change in status.changes}
+    assert kinds == {"same": set(), "floor": {"floor"}, "payload": {"payload"}}
+
+
+def test_a_robot_at_rest_has_no_numbers_and_says_why():
+    t = np.arange(800) / 100.0
+    run = omnidyn.Run(t=t, voltage=np.zeros((800, 3)), twist=np.random.default_rng(0).normal(size=(800, 3)) * NOISE)
+    status = fed(run).status
+    assert not status.numbers
+    assert "never visibly moved" in status.waiting
+    assert "no numbers yet after 7 s" in str(status.verdict)
+
+
+def test_gaps_restarts_and_missing_values_are_survived_and_said(log, live):
+    twist, voltage = log.twist.copy(), log.voltage.copy()
+    twist[700:720], voltage[900:903] = np.nan, np.nan
+    broken = omnidyn.Run(t=log.t, voltage=voltage, twist=twist)
+    other = omnidyn.Live(WRONG)
+    fed(part(broken, 0, 1200), other)
+    later = part(broken, 1300, len(broken))  # a second of rows is lost
+    fed(part(later, 0, 800), other)
+    last = part(later, 800, len(later))
+    fed(last.replace(t=last.t - last.t[0]), other)  # the logger begins anew
+    status = other.status
+    assert status.restarts == 1
+    assert status.gap > 1.0
+    assert {statement.code for statement in status.statements()} == {"live_restarts", "live_gap"}
+    for name in BOX:
+        assert abs(status.numbers[name].value - live.status.numbers[name].value) < 3.0 * live.status.numbers[name].std
+
+
+def test_what_old_rows_said_stays_when_they_are_forgotten(log, live, monkeypatch):
+    monkeypatch.setattr("omnidyn.identification.live.live.MOST_ROWS", 1500)
+    other = fed(log)
+    assert other._rows.count <= 1600
+    for name in BOX:
+        ours, whole = other.status.numbers[name], live.status.numbers[name]
+        assert ours.std < 1.4 * whole.std
+        assert abs(ours.value - whole.value) < 1.5 * whole.std
+
+
+def test_rows_keep_time_and_join_channels():
+    rows = Rows()
+    first = omnidyn.Run(t=[0.0, 0.1], twist=np.zeros((2, 3)))
+    second = omnidyn.Run(t=[0.0, 0.1], voltage=np.ones((2, 3)))
+    for run in (first, second):
+        rows.add(rows.on_clock(run))
+    run = rows.between(-np.inf, np.inf)
+    assert run.t.tolist() == pytest.approx([0.0, 0.1, 2.1, 2.2])
+    assert np.isnan(run.twist[2:]).all()
+    assert np.isnan(run.voltage[:2]).all()
+    assert rows.restarts == 1
+    rows.forget(2.0)
+    assert rows.count == 2
+    assert rows.total == 4
+
+
+def test_what_cannot_be_used_is_refused():
+    with pytest.raises(omnidyn.OmnidynError, match="another number of wheels; got 4; expected 3, as axebot has; give"):
+        omnidyn.Live(ROBOT).add(omnidyn.Run(t=[0.0, 0.1], voltage=np.zeros((2, 4)), twist=np.zeros((2, 3))))
+    with pytest.raises(omnidyn.OmnidynError, match="got -1; expected a share above 0"):
+        omnidyn.Live(ROBOT, within=-1)
+    with pytest.raises(omnidyn.OmnidynError, match=r"speed loop.*expected drive kind voltage or duty"):
+        omnidyn.Live(omnidyn.load_robot("robotino"))

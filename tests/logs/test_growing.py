@@ -1,0 +1,64 @@
+"""A text file that is still being written: whole rows only, whatever else it holds."""
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.logs.growing import FIRST_ROWS, GrowingTable
+
+HEAD = "t_s,u1_V,u2_V,u3_V,x_m,y_m,heading_rad\n"
+
+
+def row(k, heading=0.0):
+    return f"{0.01 * k:.2f},1.0,-1.0,{0.1 * (k % 7):.1f},{0.001 * k:.4f},0.0,{heading:.4f}\n"
+
+
+def joined(runs):
+    return np.concatenate([run.t for run in runs])
+
+
+@pytest.fixture
+def table(axebot):
+    return GrowingTable("log.csv", axebot)
+
+
+def test_rows_come_once_whole_however_they_are_cut(table):
+    text = HEAD + "".join(map(row, range(300)))
+    runs = [run for first in range(0, len(text), 97) for run in table.feed(text[first : first + 97])] + table.end()
+    assert joined(runs).tolist() == pytest.approx((0.01 * np.arange(300)).tolist())
+    assert runs[-1].voltage[-1].tolist() == [1.0, -1.0, pytest.approx(0.5)]
+
+
+def test_half_lines_headers_and_words_are_left_out_and_counted(table):
+    rows = [*map(row, range(150))]
+    rows[120] = "1.20,1.0,-1\n"
+    rows[130] = HEAD
+    rows[140] = "Guru meditation\n"
+    runs = table.feed(HEAD + "".join(rows)) + table.feed("1.60,1.0,")
+    assert len(joined(runs)) == 147
+    assert table.bad_rows == 2
+    assert table.end() == []
+
+
+def test_a_clock_that_begins_anew_begins_a_run_of_its_own(table):
+    runs = table.feed(HEAD + "".join(map(row, range(150))))
+    live = omnidyn.Live(table.robot)
+    for run in [*runs, *table.feed("".join(map(row, range(120))))]:
+        live.add(run)
+    assert live._rows.total == 270
+    assert live._rows.last > 2.6
+
+
+def test_headings_go_on_over_whole_turns(table):
+    angle = 0.05 * np.arange(300)
+    wrapped = (angle + np.pi) % (2.0 * np.pi) - np.pi
+    rows = [row(k, wrapped[k]) for k in range(300)]
+    runs = table.feed(HEAD + "".join(rows[:150])) + [run for text in rows[150:] for run in table.feed(text)]
+    assert np.concatenate([run.pose[:, 2] for run in runs]) == pytest.approx(angle, abs=1e-3)
+
+
+def test_what_is_no_table_is_refused(table):
+    with pytest.raises(omnidyn.OmnidynError, match=r"log\.csv"):
+        table.feed("".join(f"hello {k}\n" for k in range(FIRST_ROWS + 5)))
+    with pytest.raises(omnidyn.OmnidynError, match=r"a line does not end; got .*; expected rows of text"):
+        GrowingTable("pipe").feed("1" * (2 << 20))
