@@ -160,6 +160,8 @@ def test_what_a_fit_found_of_its_logs_is_what_controllers_take():
     noisy = fitted.replace(log=LogEffects(latency=late, pose_rate=30.0, pose_noise=1e-3, heading_noise=2e-3))
     expected = Sensors(twist="mean", pose_delay=0.05, pose_rate=30.0, pose_noise=1e-3, heading_noise=2e-3)
     assert noisy.sensor_model == expected
+    counts = noisy.replace(log=noisy.log.replace(encoder_counts=512.0))
+    assert counts.sensor_model == expected.replace(encoder_counts=512.0)
     assert AXEBOT.sensor_model == Sensors()
 
 

@@ -51,6 +51,23 @@ MOST_COUNTS, NOISIEST, MOST_BIAS = 1e7, 10.0, 1.0  # in a turn; [m], [rad], [rad
 SHORT_FILTER = 0.3  # of a step: what a shorter filter shows is nearer to the instant than to a mean
 
 
+# What a sensor is, to a controller and in a log
+EncoderCounts = Annotated[
+    Annotated[float, number(1.0, MOST_COUNTS)] | None, Field(description="counts in a turn of a wheel")
+]
+PoseRate = Annotated[
+    Annotated[float, number(0.1, FASTEST)] | None, Field(alias="pose_rate_Hz", description="of new poses")
+]
+PoseNoise = Annotated[
+    Annotated[float, number(0.0, NOISIEST)] | None,
+    Field(alias="pose_noise_m", description="std of a pose along x and along y"),
+]
+HeadingNoise = Annotated[
+    Annotated[float, number(0.0, NOISIEST)] | None,
+    Field(alias="heading_noise_rad", description="std of the heading of a pose"),
+]
+
+
 class Sensors(Value):
     """What speeds and poses are to a controller: the table [sensors] of a robot file.
 
@@ -69,9 +86,7 @@ class Sensors(Value):
         Annotated[float, number(0.0, SLOWEST_FILTER)],
         Field(alias="twist_filter_s", description="time constant of a low pass of the speeds"),
     ] = 0.0
-    encoder_counts: Annotated[
-        Annotated[float, number(1.0, MOST_COUNTS)] | None, Field(description="counts in a turn of a wheel")
-    ] = None
+    encoder_counts: EncoderCounts = None
     gyro_noise: Annotated[
         Annotated[float, number(0.0, NOISIEST)] | None,
         Field(alias="gyro_noise_rad_s", description="std of a sample of a gyroscope"),
@@ -84,17 +99,9 @@ class Sensors(Value):
         Annotated[float, number(0.0, LATEST_POSE)],
         Field(alias="pose_delay_s", description="age of a pose when it arrives"),
     ] = 0.0
-    pose_rate: Annotated[
-        Annotated[float, number(0.1, FASTEST)] | None, Field(alias="pose_rate_Hz", description="of new poses")
-    ] = None
-    pose_noise: Annotated[
-        Annotated[float, number(0.0, NOISIEST)] | None,
-        Field(alias="pose_noise_m", description="std of a pose along x and along y"),
-    ] = None
-    heading_noise: Annotated[
-        Annotated[float, number(0.0, NOISIEST)] | None,
-        Field(alias="heading_noise_rad", description="std of the heading of a pose"),
-    ] = None
+    pose_rate: PoseRate = None
+    pose_noise: PoseNoise = None
+    heading_noise: HeadingNoise = None
 
     @property
     def averaged(self) -> bool:
@@ -138,7 +145,7 @@ class LogEffects(Value):
     """gain: of the voltage. fade: share of it lost from the start of a run to its end, evenly. tilt: constant force
     along x and y of the room [N]: of the headings of the log, or as the robot stood when it began. push: constant force
     along x and y of the body [N] and about yaw [N m]. latency: of the channels. of: marks of the logs, see `log_mark`.
-    pose_rate [Hz], pose_noise [m], heading_noise [rad]: of its poses, as of `Sensors`.
+    encoder_counts; pose_rate [Hz], pose_noise [m], heading_noise [rad]: of its counts and poses, as of `Sensors`.
     """
 
     gain: Annotated[Annotated[float, number(0.01, 100.0)], Field(description="of the voltage, a battery")] = 1.0
@@ -154,17 +161,10 @@ class LogEffects(Value):
         Annotated[Levels, per_axis_number(-HARDEST, HARDEST)], Field(description="force on the body, N, N, N m")
     ] = (0.0, 0.0, 0.0)
     latency: Lateness = Lateness()
-    pose_rate: Annotated[
-        Annotated[float, number(0.1, FASTEST)] | None, Field(alias="pose_rate_Hz", description="of new poses")
-    ] = None
-    pose_noise: Annotated[
-        Annotated[float, number(0.0, NOISIEST)] | None,
-        Field(alias="pose_noise_m", description="std of a pose along x and along y"),
-    ] = None
-    heading_noise: Annotated[
-        Annotated[float, number(0.0, NOISIEST)] | None,
-        Field(alias="heading_noise_rad", description="std of the heading of a pose"),
-    ] = None
+    encoder_counts: EncoderCounts = None
+    pose_rate: PoseRate = None
+    pose_noise: PoseNoise = None
+    heading_noise: HeadingNoise = None
     of: Annotated[Annotated[tuple[Text, ...], BeforeValidator(to_list)], Field(description="marks of these logs")] = ()
 
     def is_of(self, run: Run) -> bool:
@@ -194,8 +194,8 @@ def sensors_of(sensors: Sensors | None, log: LogEffects | None, drive: float) ->
     late = log.latency
     behind = 0.0 if late.position is None else float(late.position) - drive
     counted = late.averaged or late.wheel_angle is not None
-    camera = {name: getattr(log, name) for name in ("pose_rate", "pose_noise", "heading_noise")}
-    return Sensors(twist=MEAN if counted else INSTANTANEOUS, pose_delay=min(max(behind, 0.0), LATEST_POSE), **camera)
+    shown = {name: getattr(log, name) for name in ("encoder_counts", "pose_rate", "pose_noise", "heading_noise")}
+    return Sensors(twist=MEAN if counted else INSTANTANEOUS, pose_delay=min(max(behind, 0.0), LATEST_POSE), **shown)
 
 
 def log_mark(run: Run) -> str:

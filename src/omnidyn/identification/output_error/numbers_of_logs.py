@@ -128,7 +128,7 @@ def _effects(
         latency=latency,
         tilt=(tilt[0], tilt[1]),
         push=(push[0], push[1], push[2]),
-    ).replace(**_poses(runs))
+    ).replace(**_poses(runs), **_counts(records))
     return None if effects == LogEffects() else effects.replace(of=tuple(log_mark(run) for run in runs))
 
 
@@ -161,6 +161,12 @@ def _poses(runs: Sequence[Run]) -> dict[str, float]:
         "pose_noise": place,
         "heading_noise": float(std[2]),
     }
+
+
+def _counts(records: Sequence[Record]) -> dict[str, float]:
+    """Counts in a turn of a wheel, where angles or speeds are taken as such; nothing elsewhere."""
+    ticks = [tick for record in records for tick in record.ticks if tick > 0.0]
+    return {"encoder_counts": float(2.0 * np.pi / np.median(ticks))} if ticks else {}
 
 
 def _added_up(run: Run, latency_by_channel: Mapping[str, float]) -> bool:

@@ -9,7 +9,6 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.drive import DUTY
-from omnidyn.model.log_effects import Sensors
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -30,12 +29,12 @@ COUNTS = 2048.0  # in a turn of a wheel, where the robot file says nothing
 def noise_of(robot: Robot, dt: float, given: Mapping[str, object] | None = None) -> dict[str, FloatArray]:
     """Channel -> std of its noise, one per component; of wheel_angle the step of a count [rad].
 
-    given: by the user; else by the [sensors] of the robot file: counts and poses. Where that says nothing of counts,
-    speeds are taken as logged that are differences of COUNTS a turn: with the noise of what a count rounds off.
+    given: by the user; else by the [sensors] of the robot file, or what a fit found of its logs: counts and poses.
+    Where that says nothing of counts, speeds are taken as logged that are differences of COUNTS a turn: with the noise of what a count rounds off.
 
     Raises InputError for another channel, or for a noise that is no positive number, or as many as components.
     """
-    wheels, sensors = robot.wheels.count, robot.sensors or Sensors()
+    wheels, sensors = robot.wheels.count, robot.sensor_model
     if given is None:
         tick = 2.0 * np.pi / (sensors.encoder_counts or COUNTS)
         given = {"wheel_angle": tick} if sensors.encoder_counts else {"wheel_speed": tick / dt / np.sqrt(6.0)}
@@ -81,7 +80,7 @@ def recorded(robot: Robot, share: FloatArray, dt: float, noise: Noise, rng: np.r
             continue
         exact = np.asarray(getattr(run, channel))[::fine]
         channels[channel] = exact + std * rng.standard_normal(exact.shape)
-        rate = (robot.sensors or Sensors()).pose_rate
+        rate = robot.sensor_model.pose_rate
         if channel == "pose" and rate is not None:
             channels[channel][np.diff(np.floor(t * rate), prepend=-1.0) == 0.0] = np.nan
     inputs = {name: None if rows is None else rows[::fine] for name in INPUTS for rows in (getattr(run, name),)}

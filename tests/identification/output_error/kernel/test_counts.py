@@ -210,6 +210,8 @@ def test_ticks_are_found_and_hold_the_truth(axebot, rolled):
         assert abs(value - float(Key.parse(key).get(axebot))) <= 4.5 * fit.std[key]
     assert list(fit.noise) == [f"wheel_angle[{i}]" for i in range(3)]
     assert list(fit.noise.values()) == pytest.approx([0.3 * tick] * 3, rel=0.1)
+    assert fit.robot.log.encoder_counts == pytest.approx(512)
+    assert fit.robot.sensor_model.encoder_counts == pytest.approx(512)
 
 
 def test_wheel_speeds_that_are_differences_of_the_angles_are_left_out(axebot, rolled):
