@@ -73,6 +73,10 @@ def test_two_logs_are_aligned_as_the_library_does(log, tmp_path):
     run = omnidyn.read_log(log)
     late = tmp_path / "late.csv"
     omnidyn.write_run(run.replace(t=run.t + 0.37), late)
-    said = job.align({"logs": [{"path": str(late)}, {"path": str(log)}], "robot": ""}, lambda kind, value: None, None)
+    said = job.align(
+        {"logs": [{"path": str(late), "name": "late"}, {"path": str(log), "name": "log"}], "robot": ""},
+        lambda kind, value: None,
+        None,
+    )
     assert said["offset"] == omnidyn.align(omnidyn.read_log(late), run).offset
     assert said["severity"] == "note"

@@ -15,14 +15,15 @@ from omnidyn.cli.identify_brief import brief, with_plan
 from omnidyn.cli.terminal.flags import with_flags
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import tell as tell_document
+from omnidyn.errors import InputError
 from omnidyn.files import check_output, keep_apart, write_atomic
 from omnidyn.identification.methods import SteadyState
-from omnidyn.identification.planning.got import beside
 from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
     from omnidyn.attempts import Attempts
     from omnidyn.identification.identification import Identification
+    from omnidyn.identification.planning.got import Got
     from omnidyn.model.robot import Robot
 
 PAGE = "page"
@@ -103,13 +104,22 @@ def tell(
     if of_points:
         document, output = result.estimate.document(), files[0] if files else None
     else:
-        got = beside(to.planned, result.estimate) if to.planned else {}
+        got = _beside_plan(to.planned, result) if to.planned else {}
         document, output = result.document() if to.json or to.full else brief(result, got), to.files or None
         if got and (to.json or to.full):
             document = with_plan(document, got)
     tell_document(document, to.json, record, output=output, report=report or None)
     say_written([*files, *([report] if report else [])])
     to.finish(attempts)
+
+
+def _beside_plan(path: str, result: Identification) -> dict[str, Got]:
+    from omnidyn.identification.planning.got import beside
+
+    try:
+        return beside(path, result.estimate)
+    except InputError as error:
+        raise error.at("--planned") from None
 
 
 def _page(result: Identification, record: dict[str, Any]) -> str:

@@ -37,7 +37,6 @@ def beside(path: str | os.PathLike[str], estimate: Estimate) -> dict[str, Got]:
             "no plan in this file",
             got=str(path),
             expected="what omnidyn plan -o plan.csv wrote beside its program, plan.json",
-            where="--planned",
         ) from None
     found = {
         name: Got(*shares, estimate.half_width(name)) for name, shares in planned.items() if name in estimate.value
@@ -48,7 +47,6 @@ def beside(path: str | os.PathLike[str], estimate: Estimate) -> dict[str, Got]:
             got=", ".join(planned) or "none",
             expected=", ".join(estimate.value),
             remedy="give the plan of this drive; its `free` and those of this fit agree",
-            where="--planned",
         )
     return found
 

@@ -29,9 +29,9 @@ COUNTS = 2048.0  # in a turn of a wheel, where the robot file says nothing
 def noise_of(robot: Robot, dt: float, given: Mapping[str, object] | None = None) -> dict[str, FloatArray]:
     """Channel -> std of its noise, one per component; of wheel_angle the step of a count [rad].
 
-    given: by the user; else by the [sensors] of the robot file, or what a fit found of its logs: counts and poses. Where
-    that says nothing of counts, speeds are taken as logged that are differences of COUNTS a turn: with the noise of what
-    a count rounds off.
+    given: by the user; else by the [sensors] of the robot file, or what a fit found of its logs: counts and poses.
+    Where that says nothing of counts, speeds are taken as logged that are differences of COUNTS a turn: with the noise
+    of what a count rounds off.
 
     Raises InputError for another channel, or for a noise that is no positive number, or as many as components.
     """

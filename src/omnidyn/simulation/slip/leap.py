@@ -135,7 +135,7 @@ def _travelling(hold, v, room):
         u = moved
         if change <= ROOT_TOLERANCE * (abs(u[0]) + abs(u[1]) + abs(u[2])):
             break
-    return u
+    return u[0], u[1], u[2]
 
 
 @part
