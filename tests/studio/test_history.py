@@ -149,6 +149,7 @@ def test_no_path_of_the_server_stands_in_what_is_said_or_written(session, tmp_pa
 def test_the_words_of_the_library_have_the_names_of_the_page():
     said = "hold out a log with `hold_out`, see `check`; raise `max_bytes`"
     assert in_page_names(said) == "hold out a log with hold out (tab Fit), see check; raise --max-bytes"
+    assert in_page_names("hold it out (`hold_out`): then") == "hold it out (hold out, tab Fit): then"
     told = each_text({"text": said, "columns": [{"column": "`hold_out`"}]}, in_page_names)
     assert told["columns"] == [{"column": "`hold_out`"}]
     assert "`" not in told["text"]

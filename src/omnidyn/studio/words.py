@@ -20,11 +20,13 @@ AXES = ("vx", "vy", "omega")
 CHANNEL_NAMES = {"twist": "speed over the ground", "wheel_speed": "wheel speeds", "wheel_angle": "wheel angles"}
 _LATENCY, _TWIST = re.compile(r"\blatency\.([a-z_]+)"), re.compile(r"\btwist\[([0-2])\]")
 _OPTION = re.compile(r"`([a-z]+(?:_[a-z]+)*)`")
+_NESTED = re.compile(r"\(([^()]*) \(([^()]*)\)\)")
 
 
 def in_page_names(text: str) -> str:
     """A text with each option in backticks as a page has it, else as the command line has it."""
-    return _LATENCY.sub(_of_channel, _TWIST.sub(lambda match: AXES[int(match[1])], _OPTION.sub(_of_page, text)))
+    named = _NESTED.sub(r"(\1, \2)", _OPTION.sub(_of_page, text))
+    return _LATENCY.sub(_of_channel, _TWIST.sub(lambda match: AXES[int(match[1])], named))
 
 
 def number_in_words(name: str) -> str:
