@@ -237,6 +237,14 @@ def interval_cell(ends: tuple[float, float], form: str = ".4g") -> str:
     return f"[{ends[0]:{form}}, {ends[1]:{form}}]"
 
 
+TELLS_NOTHING = 3.0  # half an interval, of the number, from which on no digit is shown
+
+
+def percent_cell(half: float) -> str:
+    """Half an interval as a share of its number, in a table of percents."""
+    return f"{100.0 * half:.2g}" if half < TELLS_NOTHING else "-"
+
+
 # Words of the trade, each explained in a line; a result shows the lines of those that occur in it (document.py)
 
 GLOSSARY = {

@@ -7,14 +7,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from omnidyn.cli.terminal.telling import brief_document
-from omnidyn.document import Document, Table, Words, apart, interval_cell, sentence
+from omnidyn.document import Document, Table, Words, apart, interval_cell, percent_cell, sentence
 
 if TYPE_CHECKING:
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.identification import Identification
     from omnidyn.identification.planning.got import Got
-
-MOST_SHOWN = 3.0  # half an interval, of the number, from which on no digit is shown
 
 
 def brief(result: Identification, planned: Mapping[str, Got] | None = None) -> Document:
@@ -27,7 +25,7 @@ def brief(result: Identification, planned: Mapping[str, Got] | None = None) -> D
     head, align = ["number", "value", "95 % interval", "unit", "key"], "<>><<"
     if promised:
         head, align = [*head[:3], "planned, got +- %", *head[3:]], "<>>><<"
-        rows = [(*row[:3], promised_cell(promised.get(row[-1])), *row[3:]) for row in rows]
+        rows = [(*row[:3], _promised_cell(promised.get(row[-1])), *row[3:]) for row in rows]
     of_study = result.study.warnings if result.study is not None else ()
     warnings = [*of_study, *(warning for estimate in result.groups.values() for warning in estimate.warnings)]
     table = Table(head, rows, align)
@@ -38,19 +36,18 @@ def brief(result: Identification, planned: Mapping[str, Got] | None = None) -> D
 
 def with_plan(document: Document, planned: Mapping[str, Got]) -> Document:
     """All that a result says, and what a plan promised beside it."""
-    rows = [(name, _percent(one.planned), _percent(one.worst), _percent(one.got)) for name, one in planned.items()]
+    rows = [
+        (name, percent_cell(one.planned), percent_cell(one.worst), percent_cell(one.got))
+        for name, one in planned.items()
+    ]
     table = Table(("key", "95 % planned +- %", "worst %", "got %"), rows, "<>", name="planned")
     data = {**document.data, "planned": {name: one._asdict() for name, one in planned.items()}}
     return replace(document, parts=apart(document.parts, [table]), data=data)
 
 
-def promised_cell(of: Got | None) -> str:
+def _promised_cell(of: Got | None) -> str:
     """What a plan promised and what the fit has [%]; nothing for a number that it does not speak of."""
-    return "" if of is None else f"{_percent(of.planned)}, {_percent(of.got)}"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g}" if share < MOST_SHOWN else "-"
+    return "" if of is None else f"{percent_cell(of.planned)}, {percent_cell(of.got)}"
 
 
 def _rows(group: str, estimate: Estimate, groups: int) -> Iterator[tuple[str, ...]]:

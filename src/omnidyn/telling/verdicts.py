@@ -59,6 +59,17 @@ def _records(statement: Statement) -> str:
     return f"predicted for a log of {all_of(words)}, at {statement.numbers['rate']:.4g} Hz; log less, and it tells less"
 
 
+def _finer(statement: Statement) -> str:
+    """Where a plan promises what no model of a real robot holds."""
+    numbers = statement.numbers
+    names = "number is" if numbers["count"] == 1 else "numbers are"
+    return (
+        f"{numbers['count']} {names} predicted within less than {100.0 * numbers['limit']:.2g} %, the best within "
+        f"{short(100.0 * numbers['finest'])} %: by these sensors alone, for a robot that is just as its model; a real "
+        "one is not, so expect wider intervals (identify shows both: `planned`)"
+    )
+
+
 def _predicted(held_out: Statement | None) -> str:
     """How near noise the errors on logs held out are; "" where none was, or nothing is sure."""
     if held_out is None or held_out.code == "held_out_colour":
@@ -150,6 +161,7 @@ SENTENCES = {
     "planned": Sentence(_planned),
     "plan_stays_inside": Sentence(_inside),
     "plan_records": Sentence(_records),
+    "plan_finer_than_models": Sentence(_finer),
     "plan_begins": Sentence(
         "drive both programs from rest, log them apart, and give the second, of {held_out:.3g} s, to identify as "
         "`hold_out`"

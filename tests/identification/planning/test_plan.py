@@ -94,6 +94,11 @@ def test_it_tells_more_than_ramps_and_steps_do():
     assert np.exp(sure[0] - sure[1]) > 1.2
 
 
+def test_what_speeds_tell_is_no_finer_than_models_are(made):
+    assert min(number.half for number in made.predicted.values()) >= 0.005
+    assert "plan_finer_than_models" not in {said.code for said in made.statements()}
+
+
 def test_one_number_is_learnt_better_where_it_is_asked_for():
     name = BOX[2]
     plain, aimed = (omnidyn.plan(AXEBOT, ROOM, 30.0, noise=NOISE, free=("friction",), aim=aim) for aim in ("", name))
@@ -208,6 +213,10 @@ def test_an_ordinary_robot_is_as_sure_as_it_was_told():
     robot = four.replace(drive=four.drive.replace(kind="duty", supply=12.0, latency=0.02), sensors=sensors)
     made, rng, fine = omnidyn.plan(robot, ROOM, 40.0), np.random.default_rng(0), 20
     assert "wheel_angle in counts of 0.0031 rad" in str(made)
+    finest = min(number.half for number in made.predicted.values())
+    said = [said for said in made.statements() if said.code == "plan_finer_than_models"]
+    assert [one.numbers["finest"] for one in said] == ([finest] if finest < 0.005 else [])
+    assert finest < 0.005
     run = omnidyn.simulate(robot, duty=np.repeat(made.commands().duty, fine, axis=0), supply=12.0, dt=made.dt / fine)
     turned = np.cumsum(0.5 * (run.wheel_speed[1:] + run.wheel_speed[:-1]), axis=0) * made.dt / fine
     tick, rows = 2.0 * np.pi / 2048, slice(None, None, fine)

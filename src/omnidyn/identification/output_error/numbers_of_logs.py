@@ -2,8 +2,7 @@
 
 The dead band of a driver is the robot's, and so is what all channels are late by together: to whatever commands the
 robot it is one delay, wherever on the way it arises. A gain, a fade, a tilt, a push, and what one channel is later
-than
-another belong to the logs, and stand in the table [log] with the marks of these.
+than another belong to the logs, and stand in the table [log] with the marks of these.
 """
 
 from __future__ import annotations

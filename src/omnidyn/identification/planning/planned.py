@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Points, Table, plain
+from omnidyn.document import Document, Points, Table, percent_cell, plain
 from omnidyn.identification.output_error.trust.cures import Blind
 from omnidyn.identification.planning.moves import PlannedMove
 from omnidyn.identification.planning.recorded import driven
@@ -23,8 +23,8 @@ from omnidyn.statement import NOTE, WARNING, Statement, as_verdict
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+FINEST_SHARE = 0.005  # half an interval, of the number: below, what the model leaves out decides, not the sensors
 OPEN_SHARE = 0.5  # half an interval, of the number: what is wider is not learnt
-TELLS_NOTHING = 3.0  # half an interval, of the number, from which on no digit is shown
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,9 @@ class Plan(Displayable):
     robot: it is made for. dt [s]: of a row. share (rows, wheels), held_out (rows, wheels): the input of the program and
     of a second one to judge the fit by, as shares of the largest input; `limit` is that input, in `unit`, V or duty.
     moves: (start [s], move) of the program. area [m], reach [m]: the room, and how far it goes along x and y at most,
-    of all robots drawn. predicted: key -> what will be known. noise: channel -> std, of what is recorded,
-    of wheel_angle the step of a count [rad]. robots: how many were drawn. blind: what
-    no log of these channels shows, and what would.
+    of all robots drawn. predicted: key -> what will be known. noise: channel -> std of what is recorded, of
+    wheel_angle the step of a count [rad]. robots: how many were drawn. blind: what no log of these channels shows, and
+    what would.
     """
 
     robot: Robot
@@ -106,12 +106,16 @@ class Plan(Displayable):
         return Statement("planned", WARNING if missing else NOTE, self.robot.name, numbers)
 
     def statements(self) -> list[Statement]:
-        """Where it goes, and what is asked of who drives it."""
+        """Where it goes, what is asked of who drives it, and where it promises more than models hold."""
+        fine = {name: number.half for name, number in self.predicted.items() if number.half < FINEST_SHARE}
+        numbers = {"finest": min(fine.values(), default=0.0), "count": len(fine), "limit": FINEST_SHARE}
+        too_fine = [Statement("plan_finer_than_models", WARNING, numbers=numbers)] if fine else []
         return [
             Statement(
                 "plan_stays_inside", NOTE, numbers={"reach": self.reach, "area": self.area, "robots": self.robots}
             ),
             Statement("plan_records", NOTE, numbers={"noise": self.noise, "rate": 1.0 / self.dt}),
+            *too_fine,
             Statement("plan_begins", NOTE, numbers={"held_out": len(self.held_out) * self.dt}),
             *(one.statement() for one in self.blind),
         ]
@@ -119,7 +123,7 @@ class Plan(Displayable):
     def document(self) -> Document:
         """What it says."""
         numbers = [
-            (in_words(name), name, f"{number.value:.4g}", _percent(number.half), _percent(number.worst))
+            (in_words(name), name, f"{number.value:.4g}", percent_cell(number.half), percent_cell(number.worst))
             for name, number in self.predicted.items()
         ]
         moves = [
@@ -152,7 +156,3 @@ class Plan(Displayable):
     def plot(self) -> Figure:
         """The inputs, and where the robot goes in its room, as a matplotlib Figure."""
         return make(FIGURE, self)
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g}" if share < TELLS_NOTHING else "-"
