@@ -5,6 +5,10 @@ guess: friction 1.5 times what it is, motors a tenth off, no latency. `pid` and 
 plant by encoders, with the guess and with what was fitted. A cell is lost where the fitted robot is more than 1.1 times
 as far off as the guessed one, and by more than a difference that counts. The latency is to be in its interval, or
 nearer to it than the time step of the plant.
+
+The last rows are the chain by defaults, on the ordinary robot: four wheels, a turning frame, duty with latency. A file
+of `init`, which knows sizes and mass; a log of counts and a camera of 30 Hz; `identify` with all defaults; controllers
+with what it wrote, by encoders and by that camera, beside the true robot whose sensors are told.
 """
 
 from __future__ import annotations
@@ -14,7 +18,7 @@ from typing import Any
 import numpy as np
 
 import omnidyn
-from benchmarks.control_real import ALLOWED, COUNTS, DT, errors
+from benchmarks.control_real import ALLOWED, COUNTS, DT, Instruments, errors, told
 from benchmarks.control_real.paths import paths
 from benchmarks.control_real.plant import SUBSTEP, Plant
 from benchmarks.control_real.robots import NUMBERS, Numbers, robot_of
@@ -22,6 +26,7 @@ from benchmarks.table import Table, machine
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.pid import Pid
 from omnidyn.identification.identification import Identification
+from omnidyn.model.first_guess import first_guess
 from omnidyn.model.friction import Friction
 from omnidyn.model.log_effects import Sensors
 from omnidyn.model.robot import Robot
@@ -31,6 +36,7 @@ SECONDS, HOLD, SEED = 30.0, 1.0, 1  # [s], [s] between two levels
 FRICTION, RESISTANCE = 1.5, 1.1  # times the truth
 FREE = ("friction", "motor.resistance_ohm")
 CONTROLLERS = {"pid": Pid, "mpc": Mpc}
+CAMERA, MOST_RATIO = "camera 1 mm", 1.2  # of CAMERAS; error of the fitted robot over that of the true one
 
 
 def driven(numbers: Numbers, seed: int) -> Run:
@@ -81,8 +87,46 @@ def _add_latency(table: Table, robot: str, plant: Plant, fit: Identification) ->
     table.add("nearer than 0.4 ms", off < SUBSTEP, robot=robot, path="latency", guessed="0", **words)
 
 
+def ordinary_log(numbers: Numbers) -> Run:
+    """What the ordinary robot logs: duties, counts, and poses of a camera that are late."""
+    run, plant = driven(numbers, SEED), Plant(numbers)
+    assert run.duty is not None
+    instruments, angles, poses, last = Instruments(CAMERA, plant, SEED), [plant.encoders()], [], None
+    for row in run.duty:
+        pose, _ = instruments.seen()
+        poses.append(pose if last is None or not np.array_equal(pose, last) else np.full(3, np.nan))
+        last = pose
+        instruments.drive(row, DT)
+        angles.append(plant.encoders())
+    supply = np.full(len(run.duty), plant.volts)
+    return Run(t=run.t, duty=run.duty, supply=supply, wheel_angle=np.array(angles[:-1]), pose=np.array(poses))
+
+
+def add_ordinary(table: Table, robot: str) -> None:
+    """Rows of the chain by defaults, and the mean ratio of each controller and sensor."""
+    numbers = NUMBERS[robot] | {"duty": True}
+    true = robot_of(robot, numbers)
+    wheels = true.wheels.replace(wheel_inertia=0.0)
+    guess = first_guess("ordinary", wheels, true.body.mass, float(np.max(true.motor.voltage_limit)))
+    fitted = omnidyn.identify(ordinary_log(numbers), guess).robot
+    for kind in ("encoder", CAMERA):
+        for controller, make in CONTROLLERS.items():
+            ratios = []
+            for name in ("clover", "square", "creep"):
+                shown = errors(Plant(numbers), make(fitted), paths()[name], kind)
+                best = errors(Plant(numbers), make(told(true, kind)), paths()[name], kind)
+                ratios.append(shown[0] / best[0])
+                cells = {"fitted": f"{shown[0]:.2f}/{shown[1]:.2f}", "true file": f"{best[0]:.2f}/{best[1]:.2f}"}
+                table.add(robot=f"{robot}, {kind}", path=name, controller=controller, **cells)
+            ratio = float(np.exp(np.mean(np.log(ratios))))
+            goal = f"at most {MOST_RATIO:g} times"
+            table.add(
+                goal, ratio <= MOST_RATIO, robot=f"{robot}, {kind}", controller=controller, lost=f"{ratio:.2f} times"
+            )
+
+
 def measure() -> Table:
-    """The three robots on all paths."""
+    """The three robots on all paths, and the chain by defaults."""
     columns = ["robot", "path", "controller", "guessed", "fitted", "true file", "lost"]
     table = Table("control_chain: rms of position mm / heading mrad, guessed and fitted robot", columns)
     count, total = 0, 0
@@ -109,5 +153,6 @@ def measure() -> Table:
                 words: dict[str, Any] = {label: f"{cell[0]:.2f}/{cell[1]:.2f}" for label, cell in off.items()}
                 table.add(robot=robot, path=name, controller=controller, lost=", ".join(beaten), **words)
     table.add("0 cells", count == 0, robot="all", lost=f"{count} of {total}")
+    add_ordinary(table, "xdrive")
     table.notes.append(machine())
     return table

@@ -160,6 +160,10 @@ def test_what_a_fit_found_of_its_logs_is_what_controllers_take():
     noisy = fitted.replace(log=LogEffects(latency=late, pose_rate=30.0, pose_noise=1e-3, heading_noise=2e-3))
     expected = Sensors(twist="mean", pose_delay=0.05, pose_rate=30.0, pose_noise=1e-3, heading_noise=2e-3)
     assert noisy.sensor_model == expected
+    # Rows of 20 ms, a pose every 33 ms: of the 50 ms each pose waited 10 ms for its row in the mean.
+    rows = noisy.replace(log=noisy.log.replace(row=0.02))
+    assert rows.sensor_model.pose_delay == pytest.approx(0.04)
+    assert rows.sensor_model.pose_age(0.02) == pytest.approx(0.05)
     counts = noisy.replace(log=noisy.log.replace(encoder_counts=512.0))
     assert counts.sensor_model == expected.replace(encoder_counts=512.0)
     assert AXEBOT.sensor_model == Sensors()
@@ -200,7 +204,7 @@ def test_a_fit_to_counts_of_wheels_gives_means_and_says_what_controllers_take_of
     found = omnidyn.identify(log, robot)
     fitted = found.estimate.robot
     assert fitted.sensor_model.twist == "mean"
-    assert fitted.sensor_model.pose_delay == pytest.approx(late * dt, abs=0.01)
+    assert fitted.sensor_model.pose_age(dt) == pytest.approx(late * dt, abs=1e-3)  # with what it waits for a step
     assert fitted.sensor_model.pose_rate == pytest.approx(1.0 / dt, rel=1e-6)
     assert fitted.sensor_model.pose_noise == pytest.approx(5e-4, rel=0.15)
     assert fitted.sensor_model.heading_noise == pytest.approx(5e-4, rel=0.2)

@@ -48,6 +48,7 @@ class Lateness(Value):
 INSTANTANEOUS, MEAN = "instantaneous", "mean"
 LATEST_POSE, FASTEST, SLOWEST_FILTER = 1.0, 1e5, 1.0  # [s], [Hz], [s]
 MOST_COUNTS, NOISIEST, MOST_BIAS = 1e7, 10.0, 1.0  # in a turn; [m], [rad], [rad/s]; [rad/s]
+LONGEST_ROW = 10.0  # [s]
 SHORT_FILTER = 0.3  # of a step: what a shorter filter shows is nearer to the instant than to a mean
 
 
@@ -146,6 +147,7 @@ class LogEffects(Value):
     along x and y of the room [N]: of the headings of the log, or as the robot stood when it began. push: constant force
     along x and y of the body [N] and about yaw [N m]. latency: of the channels. of: marks of the logs, see `log_mark`.
     encoder_counts; pose_rate [Hz], pose_noise [m], heading_noise [rad]: of its counts and poses, as of `Sensors`.
+    row [s]: from row to row; None: poses waited for none.
     """
 
     gain: Annotated[Annotated[float, number(0.01, 100.0)], Field(description="of the voltage, a battery")] = 1.0
@@ -165,6 +167,10 @@ class LogEffects(Value):
     pose_rate: PoseRate = None
     pose_noise: PoseNoise = None
     heading_noise: HeadingNoise = None
+    row: Annotated[
+        Annotated[float, number(1.0 / FASTEST, LONGEST_ROW)] | None,
+        Field(alias="row_s", description="from row to row, for which a pose waited"),
+    ] = None
     of: Annotated[Annotated[tuple[Text, ...], BeforeValidator(to_list)], Field(description="marks of these logs")] = ()
 
     def is_of(self, run: Run) -> bool:
@@ -195,7 +201,10 @@ def sensors_of(sensors: Sensors | None, log: LogEffects | None, drive: float) ->
     behind = 0.0 if late.position is None else float(late.position) - drive
     counted = late.averaged or late.wheel_angle is not None
     shown = {name: getattr(log, name) for name in ("encoder_counts", "pose_rate", "pose_noise", "heading_noise")}
-    return Sensors(twist=MEAN if counted else INSTANTANEOUS, pose_delay=min(max(behind, 0.0), LATEST_POSE), **shown)
+    found = Sensors(twist=MEAN if counted else INSTANTANEOUS, **shown)
+    if log.row is not None:  # a pose waited for its row as it will wait for a step of the loop, which is not its delay
+        behind -= 0.5 * found.pose_wait(log.row)
+    return found.replace(pose_delay=min(max(behind, 0.0), LATEST_POSE))
 
 
 def log_mark(run: Run) -> str:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.clocks import usual_step
 from omnidyn.identification.estimate import identified, printable
 from omnidyn.identification.methods import GAUSS, NU
 from omnidyn.identification.output_error.engines.driver import late_by
@@ -136,8 +137,8 @@ LONGEST_STEP = 3.5  # usual steps from one pose to the next: what is longer is a
 
 
 def _poses(runs: Sequence[Run]) -> dict[str, float]:
-    """Rate and noise of new poses; nothing where there are few, or none that is noisy."""
-    seconds, thirds = [], []
+    """Rate and noise of new poses, and from row to row; nothing where there are few poses, or none that is noisy."""
+    seconds, thirds, rows_apart = [], [], []
     for run in runs:
         if run.pose is None:
             continue
@@ -146,6 +147,7 @@ def _poses(runs: Sequence[Run]) -> dict[str, float]:
         is_new = np.append(True, (np.diff(poses, axis=0) != 0.0).any(axis=1))[: len(t)]
         t, poses = t[is_new], poses[is_new]
         seconds.append(np.diff(t))
+        rows_apart.append(usual_step(run.t))
         thirds.append(np.diff(np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])]), n=3, axis=0))
     if sum(map(len, thirds)) < LEAST_POSES:
         return {}
@@ -159,6 +161,7 @@ def _poses(runs: Sequence[Run]) -> dict[str, float]:
         "pose_rate": float(1.0 / np.mean(steps[steps <= LONGEST_STEP * np.median(steps)])),
         "pose_noise": place,
         "heading_noise": float(std[2]),
+        "row": float(np.median(rows_apart)),
     }
 
 
