@@ -26,6 +26,7 @@ from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import end_failed, tell
 from omnidyn.document import apart, sentence
+from omnidyn.errors import InputError
 from omnidyn.files import check_output
 from omnidyn.identification.methods import FRICTION_METHODS, MOTOR_METHODS, Method, OutputError, SteadyState
 from omnidyn.progress import Progress, Report
@@ -33,6 +34,7 @@ from omnidyn.progress import Progress, Report
 if TYPE_CHECKING:
     from omnidyn.identification.motors.into_robot import MotorNumbers
     from omnidyn.identification.motors.study import MotorStudy
+    from omnidyn.identification.planning.got import Promises
     from omnidyn.model.robot import Robot
 
 
@@ -84,7 +86,7 @@ def identify(
     speed, or from a table of steady points. The answer carries standard errors, 95 % intervals and warnings in words,
     and says what the data cannot tell.
     """
-    request, to = identify_options.identify_request(given), Out(report, out, force, json, full, planned)
+    request, to = identify_options.identify_request(given), Out(report, out, force, json, full)
     if not robot and request.what != MOTORS:
         of_motors = os.path.isfile(logs[0]) and table_kind(logs) == MOTOR_TABLE
         table = f" {logs[0]} is a table of motors: say --what motors, which needs no robot." if of_motors else ""
@@ -94,7 +96,19 @@ def identify(
             check_output(path, force)
     options.keep_inputs(logs, [robot], [flags.map_file, planned], out, report, flags.save_map)
     options.refuse_missing(logs)
+    if planned:
+        to = replace(to, planned=_promises(planned))
     _identify(logs, robot, request, LogReading(flags.options(), flags.sort, flags.maps(force)), to)
+
+
+def _promises(path: str) -> Promises:
+    """What a plan promised, read before any work."""
+    from omnidyn.identification.planning.got import read_plan
+
+    try:
+        return read_plan(path)
+    except InputError as error:
+        raise error.at("--planned") from None
 
 
 def _identify(arguments: list[str], robot: str, request: IdentifyRequest, reading: LogReading, to: Out) -> None:

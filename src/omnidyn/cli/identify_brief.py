@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from omnidyn.identification.planning.got import Got
 
 
-def brief(result: Identification, planned: Mapping[str, Got] | None = None) -> Document:
-    """What the result says in about 20 lines: verdict, numbers, the gravest warnings, the next step.
+Beside = Mapping[str, Mapping[str, "Got"]]  # group -> key -> what a plan promised and what the fit has
 
-    planned: of numbers, what a plan promised and what the fit has.
-    """
-    groups, promised = len(result.groups), planned or {}
+
+def brief(result: Identification, planned: Beside | None = None) -> Document:
+    """What the result says in about 20 lines: verdict, numbers, the gravest warnings, the next step."""
+    groups, head, align = len(result.groups), ["number", "value", "95 % interval", "unit", "key"], "<>><<"
     rows = [row for group, estimate in result.groups.items() for row in _rows(group, estimate, groups)]
-    head, align = ["number", "value", "95 % interval", "unit", "key"], "<>><<"
-    if promised:
+    if planned:
         head, align = [*head[:3], "planned, got +- %", *head[3:]], "<>>><<"
-        rows = [(*row[:3], _promised_cell(promised.get(row[-1])), *row[3:]) for row in rows]
+        of_row = [planned[group] for group, estimate in result.groups.items() for _ in _rows(group, estimate, groups)]
+        rows = [(*row[:3], _promised_cell(of.get(row[-1])), *row[3:]) for row, of in zip(rows, of_row, strict=True)]
     of_study = result.study.warnings if result.study is not None else ()
     warnings = [*of_study, *(warning for estimate in result.groups.values() for warning in estimate.warnings)]
     table = Table(head, rows, align)
@@ -34,15 +34,16 @@ def brief(result: Identification, planned: Mapping[str, Got] | None = None) -> D
     return brief_document(result.headline, table, warnings, result.advice, words)
 
 
-def with_plan(document: Document, planned: Mapping[str, Got]) -> Document:
+def with_plan(document: Document, planned: Beside) -> Document:
     """All that a result says, and what a plan promised beside it."""
     rows = [
-        (name, percent_cell(one.planned), percent_cell(one.worst), percent_cell(one.got))
-        for name, one in planned.items()
+        (group, name, percent_cell(one.planned), percent_cell(one.worst), percent_cell(one.got))
+        for group, numbers in planned.items()
+        for name, one in numbers.items()
     ]
-    table = Table(("key", "95 % planned +- %", "worst %", "got %"), rows, "<>", name="planned")
-    data = {**document.data, "planned": {name: one._asdict() for name, one in planned.items()}}
-    return replace(document, parts=apart(document.parts, [table]), data=data)
+    table = Table(("group", "key", "95 % planned +- %", "worst %", "got %"), rows, "<<>", name="planned")
+    data = {group: {name: one._asdict() for name, one in numbers.items()} for group, numbers in planned.items()}
+    return replace(document, parts=apart(document.parts, [table]), data={**document.data, "planned": data})
 
 
 def _promised_cell(of: Got | None) -> str:

@@ -15,15 +15,15 @@ from omnidyn.cli.identify_brief import brief, with_plan
 from omnidyn.cli.terminal.flags import with_flags
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import tell as tell_document
-from omnidyn.errors import InputError
 from omnidyn.files import check_output, keep_apart, write_atomic
 from omnidyn.identification.methods import SteadyState
 from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
     from omnidyn.attempts import Attempts
+    from omnidyn.cli.identify_brief import Beside
     from omnidyn.identification.identification import Identification
-    from omnidyn.identification.planning.got import Got
+    from omnidyn.identification.planning.got import Promises
     from omnidyn.model.robot import Robot
 
 PAGE = "page"
@@ -31,15 +31,15 @@ PAGE = "page"
 
 @dataclass(frozen=True)
 class Out:
-    """Where results go. planned: the plan to show them beside. files: name of the robot -> file that holds it now.
-    refused: why a robot file could not be written."""
+    """Where results go. planned: what a plan promised, to show beside them. files: name of the robot -> file that holds
+    it now. refused: why a robot file could not be written."""
 
     report: str
     out: str
     force: bool
     json: bool
     full: bool = False
-    planned: str = ""
+    planned: Promises = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)
     refused: list[Exception] = field(default_factory=list)
 
@@ -104,7 +104,7 @@ def tell(
     if of_points:
         document, output = result.estimate.document(), files[0] if files else None
     else:
-        got = _beside_plan(to.planned, result) if to.planned else {}
+        got = _beside_plan(to.planned, result)
         document, output = result.document() if to.json or to.full else brief(result, got), to.files or None
         if got and (to.json or to.full):
             document = with_plan(document, got)
@@ -113,13 +113,17 @@ def tell(
     to.finish(attempts)
 
 
-def _beside_plan(path: str, result: Identification) -> dict[str, Got]:
+def _beside_plan(promises: Promises, result: Identification) -> Beside:
+    """Group -> what was promised and what its fit has; nothing where the plan speaks of no number of these fits."""
+    if not promises:
+        return {}
     from omnidyn.identification.planning.got import beside
 
-    try:
-        return beside(path, result.estimate)
-    except InputError as error:
-        raise error.at("--planned") from None
+    found = {group: beside(promises, estimate) for group, estimate in result.groups.items()}
+    if any(found.values()):
+        return found
+    say(f"omnidyn: the plan of --planned speaks of other numbers than this fit: {', '.join(promises)}")
+    return {}
 
 
 def _page(result: Identification, record: dict[str, Any]) -> str:

@@ -180,15 +180,22 @@ def test_identify_says_what_was_planned_and_what_it_got(tmp_path, capsys):
     words = ("identify", log, "--robot", "axebot", "--free", "friction", "--quick", "--planned", tmp_path / "plan.json")
     said, code, err = command(*words, "--json")
     assert code == 0, err
-    planned = said["planned"]
+    planned = said["planned"]["all"]
     assert set(planned) == set(BOX)
     # a dead band, which the fit doubts and the plan does not, widens what a level is within
     assert all(0.75 < number["got"] / number["planned"] < 1.75 for number in planned.values())
     assert main([str(word) for word in words]) == 0
     assert "planned, got +- %" in capsys.readouterr().out
-    _, code, err = command(*words[:-1], out)
-    assert code == 3
-    assert "no plan in this file" in err
+    for other in (out, log.with_name("none.json")):
+        _, code, err = command(*words[:-1], other)
+        assert code == 3
+        assert "--planned" in err or "none.json" in err
+    of_others = tmp_path / "others.json"
+    of_others.write_text(json.dumps({"predicted": {"body.mass_kg": {"half": 0.1, "worst": None}}}))
+    said, code, err = command(*words[:-1], of_others, "--json")
+    assert code == 0
+    assert "planned" not in said
+    assert "speaks of other numbers than this fit: body.mass_kg" in err
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from omnidyn.arguments import is_number
@@ -24,31 +25,32 @@ class Got(NamedTuple):
     got: float
 
 
-def beside(path: str | os.PathLike[str], estimate: Estimate) -> dict[str, Got]:
-    """Key -> what the plan promised and what the fit has, of the JSON file that `omnidyn plan` wrote with its program.
+Promises = Mapping[
+    str, tuple[float, float]
+]  # key -> half an interval, in the middle and in the worst of the robots drawn
 
-    Raises InputError for another file, and for a plan that shares no number with the fit.
+
+def read_plan(path: str | os.PathLike[str]) -> Promises:
+    """What a plan promised: the JSON file that `omnidyn plan` wrote beside its program.
+
+    Raises InputError for another file.
     """
     try:
         numbers = json.loads(read_bytes(path, MAX_TEXT_BYTES))["predicted"]
-        planned = {name: (_share(number["half"]), _share(number["worst"])) for name, number in numbers.items()}
+        return {name: (_share(number["half"]), _share(number["worst"])) for name, number in numbers.items()}
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
         raise InputError(
             "no plan in this file",
             got=str(path),
             expected="what omnidyn plan -o plan.csv wrote beside its program, plan.json",
         ) from None
-    found = {
-        name: Got(*shares, estimate.half_width(name)) for name, shares in planned.items() if name in estimate.value
+
+
+def beside(promises: Promises, estimate: Estimate) -> dict[str, Got]:
+    """Key -> what a plan promised and what the fit has, of the numbers that both know."""
+    return {
+        name: Got(*shares, estimate.half_width(name)) for name, shares in promises.items() if name in estimate.value
     }
-    if not found:
-        raise InputError(
-            "this plan is for other numbers",
-            got=", ".join(planned) or "none",
-            expected=", ".join(estimate.value),
-            remedy="give the plan of this drive; its `free` and those of this fit agree",
-        )
-    return found
 
 
 def _share(value: Any) -> float:
