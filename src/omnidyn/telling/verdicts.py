@@ -12,6 +12,8 @@ from omnidyn.telling.sentence import Sentence
 WHERE = {"fitted": "on the fitted logs", "held out": "on logs held out"}
 NAMED = 4  # shapes that a sentence names
 
+SHORTEST_WAY = 0.01  # [m] that a plan is said to go
+
 
 def _numbers_known(statement: Statement) -> str:
     """ "all 6 numbers are known, the widest (viscous friction forward) within 9 %"; what is not known is named."""
@@ -43,6 +45,7 @@ def _planned(statement: Statement) -> str:
 def _inside(statement: Statement) -> str:
     """How far a plan goes in its room."""
     (x, y), (width, depth) = statement.numbers["reach"], statement.numbers["area"]
+    x, y = (length if length >= SHORTEST_WAY else 0.0 for length in (x, y))
     return (
         f"begin in the middle of {width:.3g} m x {depth:.3g} m, along its first side: {statement.numbers['robots']} "
         f"robots that may be meant went up to {x:.2g} m along it and {y:.2g} m to the side; stop it by hand if it "
