@@ -81,8 +81,8 @@ class TrackTab:
 
             def smooth(value: float | None) -> None:
                 tracks.smoothing = value
-                said = "as much as the robot needs" if value is None else f"over {value:g} s" if value else "as drawn"
-                words.set_text(f"Corners are smoothed {said}." if value != 0.0 else "Corners stay as drawn.")
+                said = "as much as the robot needs" if value is None else f"over {value:g} s"
+                words.set_text("Corners stay as drawn." if value == 0.0 else f"Corners are smoothed {said}.")
                 slider.set_enabled(value is not None)
 
             ui.checkbox(
