@@ -105,6 +105,8 @@ class Session:
     def add_log(self, path: str, name: str) -> LogFile:
         """Take a log and check it."""
         self.count += 1
+        if any(other.name == name and other.path != path for other in self.logs.values()):
+            name = f"{Path(name).stem}-{self.count}{Path(name).suffix}"  # calls name a log by its file
         log = LogFile(f"log{self.count}", name, path)
         if any(other.stem == log.stem for other in self.logs.values()):
             log.stem = f"{log.stem}-{self.count}"
@@ -179,7 +181,8 @@ class Session:
 
     def remove(self, log: LogFile) -> None:
         """Take a log away; one that was uploaded is deleted when something else is removed, and can be brought back."""
-        self.logs.pop(log.key, None)
+        if self.logs.pop(log.key, None) is None:  # by another click already
+            return
 
         def restore() -> None:
             self.logs[log.key] = log
@@ -351,6 +354,8 @@ class Session:
 
     def remove_robot(self, name: str) -> None:
         """Take a robot file away; it can be brought back."""
+        if name not in self.robots:  # by another click already
+            return
         path, chosen = self.robots.pop(name), self.robot == name
         self.robot = self.robot * (not chosen)
 

@@ -11,6 +11,8 @@ from omnidyn.studio.session import ROBOT_SUFFIX, Session, safe_name
 
 def rename_robot(session: Session, name: str, other: str) -> str:
     """Give a robot file another name, which it then has as a file too; an error in words, or ""."""
+    if name not in session.robots:
+        return str(InputError("this robot was removed on another page", got=name, remedy="use Undo first"))
     new = f"{safe_name(other.removesuffix(ROBOT_SUFFIX))}{ROBOT_SUFFIX}"
     if new in session.robots:
         return str(InputError("there is a robot of this name", got=new, remedy="use another name"))
