@@ -158,8 +158,10 @@ def test_the_words_of_the_library_have_the_names_of_the_page():
     told = each_text({"text": said, "columns": [{"column": "`hold_out`"}]}, in_page_names)
     assert told["columns"] == [{"column": "`hold_out`"}]
     assert "`" not in told["text"]
-    assert in_page_names("latency.twist is 0; twist[1] is not followed") == (
-        "latency of the speed over the ground is 0; vy is not followed"
+    for name in ("latency.csv", "latency.twist.csv", "twist[1].csv"):  # a file of a user stays as it is
+        assert in_page_names(f"{name}: 3 rows") == f"{name}: 3 rows"
+    assert in_page_names("latency.twist is 0; twist[1] is not followed; so is latency.heading.") == (
+        "latency of the speed over the ground is 0; vy is not followed; so is latency of the heading."
     )
 
 
