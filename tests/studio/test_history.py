@@ -190,6 +190,19 @@ def test_a_second_click_on_remove_removes_nothing(session):
     assert list(fitting.history) == ["fit-1.toml"]
 
 
+def test_a_robot_file_with_the_name_of_a_fit_that_was_removed_is_not_that_fit(session, tmp_path):
+    fitting = Fitting(session)
+    kept(session, fitting)
+    fitting.remove("fit-1.toml")
+    omnidyn.save_robot(omnidyn.load_robot("axebot"), tmp_path / "fit-1.toml")
+    session.add_robot(str(tmp_path / "fit-1.toml"), "fit-1.toml")
+    assert session.robot == "fit-1-2.toml"
+    assert session.is_editable("fit-1-2.toml")
+    assert not fitting.history
+    session.undo()
+    assert list(fitting.history) == ["fit-1.toml"]
+
+
 def test_two_logs_of_one_name_have_two_names_in_what_is_done_by_hand(session):
     """Else a call would read one of them twice."""
     logs = [session.add_log(str(write_log(session.new_folder() / "log.csv", 1.0, k)), "log.csv") for k in (1, 2)]

@@ -360,16 +360,17 @@ class Session:
         self.robot = self.robot * (not chosen)
 
         def restore() -> None:
-            self.robots[back := self.free_name(name)] = path
+            back = name if name not in self.robots else self.free_name(name)
+            self.robots[back] = path
             self.robot = back if chosen and not self.robot else self.robot
 
         self._remove(Removed(name, restore, lambda: None))
 
     def free_name(self, name: str) -> str:
-        """The name, or the next one that no robot has yet."""
+        """The name, or the next one that no robot has yet, and no fit had: it may come back."""
         stem, _, suffix = name.rpartition(".")
         others = (f"{stem}-{k}.{suffix}" for k in itertools.count(2))
-        return next(free for free in itertools.chain((name,), others) if free not in self.robots)
+        return next(free for free in itertools.chain((name,), others) if free not in (self.robots.keys() | self.made))
 
     def choose(self, name: str) -> None:
         """Choose a robot; logs are checked with it."""

@@ -90,8 +90,9 @@ class TrackTab:
                 value=tracks.smoothing is None,
                 on_change=lambda e: smooth(None if e.value else slider.value),
             )
+            value = 0.2 if tracks.smoothing is None else tracks.smoothing
             slider = ui.slider(
-                min=0.0, max=MOST, step=0.05, value=tracks.smoothing or 0.2, on_change=lambda e: smooth(e.value)
+                min=0.0, max=MOST, step=0.05, value=value, on_change=lambda e: smooth(e.value)
             )
             slider.props("aria-label='seconds over which corners are smoothed'").classes("smoothing")
             smooth(tracks.smoothing)
