@@ -11,10 +11,11 @@ pytest.importorskip("nicegui", reason="the extra studio is not installed")
 
 import omnidyn
 from omnidyn.studio import calls
+from omnidyn.studio.calls import MAX_NAME
 from omnidyn.studio.compare.state import Comparing
 from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.script import script
-from omnidyn.studio.session import MAX_FILES, MAX_NAME, RefusedError, Session
+from omnidyn.studio.session import MAX_FILES, RefusedError, Session
 from omnidyn.studio.task import Task
 from omnidyn.studio.track.state import DRAWN, Tracks
 from omnidyn.studio.words import each_text, in_page_names

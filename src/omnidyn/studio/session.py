@@ -21,7 +21,7 @@ import omnidyn
 from omnidyn.errors import InputError
 from omnidyn.model.presets import robot_path
 from omnidyn.progress import Report
-from omnidyn.studio.calls import LogFile
+from omnidyn.studio.calls import LogFile, safe_name
 from omnidyn.studio.parts import COMPARE, FIT, LOGS, PROGRESS, ROBOT, TRACK
 from omnidyn.studio.removed import Removed
 from omnidyn.studio.series import META, Series
@@ -34,7 +34,6 @@ TOO_LARGE = (
     "Name it on the command line instead."
 )
 ROBOT_SUFFIX = ".toml"
-MAX_NAME = 80
 
 
 class RefusedError(Exception):
@@ -360,8 +359,7 @@ class Session:
         self.robot = self.robot * (not chosen)
 
         def restore() -> None:
-            back = name if name not in self.robots else self.free_name(name)
-            self.robots[back] = path
+            self.robots[back := self.free_name(name) if name in self.robots else name] = path
             self.robot = back if chosen and not self.robot else self.robot
 
         self._remove(Removed(name, restore, lambda: None))
@@ -379,9 +377,3 @@ class Session:
             for log in self.logs.values():
                 self.start(self.check(log))
             self.changed(ROBOT, FIT)
-
-
-def safe_name(name: str) -> str:
-    """A name of plain letters, without a folder, for a file that somebody else named."""
-    plain = re.sub(r"[^A-Za-z0-9._-]+", "_", name.replace("\\", "/").rpartition("/")[2]).lstrip("._-")
-    return plain[-MAX_NAME:].lstrip("._-") or "file"

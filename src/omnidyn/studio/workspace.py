@@ -22,8 +22,9 @@ from typing import Any
 from omnidyn.errors import InputError
 from omnidyn.files import open_regular
 from omnidyn.statement import ERROR, NOTE
+from omnidyn.studio.calls import safe_name
 from omnidyn.studio.fit.state import Fitting
-from omnidyn.studio.session import MAX_BYTES, MAX_FILE_BYTES, MAX_FILES, Session, safe_name
+from omnidyn.studio.session import MAX_BYTES, MAX_FILE_BYTES, MAX_FILES, Session
 from omnidyn.studio.task import Task
 
 SUFFIX, FILE_NAME = ".zip", "workspace.zip"

@@ -9,10 +9,10 @@ from typing import Any
 
 from omnidyn.model.robot_file import toml_literal
 from omnidyn.studio import calls
-from omnidyn.studio.calls import LogFile
+from omnidyn.studio.calls import MAX_NAME, LogFile
 from omnidyn.studio.parts import FIT, FITTED, FREE, HELD_OUT, LEFT_OUT, ROBOT
 from omnidyn.studio.robot.rename import rename_robot
-from omnidyn.studio.session import MAX_NAME, Session
+from omnidyn.studio.session import Session
 from omnidyn.studio.task import Task
 from omnidyn.studio.worker import CancelledError, JobError
 

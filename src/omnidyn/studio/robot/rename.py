@@ -5,8 +5,9 @@ from __future__ import annotations
 import shutil
 
 from omnidyn.errors import InputError
+from omnidyn.studio.calls import safe_name
 from omnidyn.studio.parts import ROBOT
-from omnidyn.studio.session import ROBOT_SUFFIX, Session, safe_name
+from omnidyn.studio.session import ROBOT_SUFFIX, Session
 
 
 def rename_robot(session: Session, name: str, other: str) -> str:
