@@ -14,7 +14,7 @@ from omnidyn.control.paths.polyline import Polyline, lines
 from omnidyn.model.robot import Robot
 
 WIDTHS = (0.1, 0.2, 0.4, 0.8, 1.6)  # [s] that are tried
-MOST = 2.0  # [s]
+LONGEST_WINDOW = 2.0  # [s]
 ROWS = 40  # of a window
 MOST_ROWS = 200_000  # of a path: of a long one a window has fewer, and one of less than two smooths nothing
 

@@ -15,7 +15,7 @@ from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.statement import ERROR
 
 LEAST_LIKENESS = 0.5  # clean logs have 0.57 and more
-LATEST = 4  # windows by which the motion may be late: a voltage that goes to and fro is half a turn late at one of them
+LAGS = 4  # windows by which the motion may be late: a voltage that goes to and fro is half a turn late at one of them
 ERRORS = 5.0  # standard errors of the likeness of two signals that have nothing to do with each other
 DRIVEN_SHARE = 0.15  # of the axis that is driven most: another one says nothing
 BY_AZIMUTH = ("wheels.azimuth_deg",)
@@ -38,7 +38,7 @@ def check_against_drive(work: LogUnderCheck) -> tuple[list[Finding], LogUnderChe
     size = np.sqrt((asked**2).sum(axis=0))
     likeness, late = np.ones(3), np.zeros(3)
     likeness[axes] = _likeness(asked[:, axes], moved)
-    for lag in range(1, min(LATEST + 1, len(asked))):
+    for lag in range(1, min(LAGS + 1, len(asked))):
         late[axes] = np.maximum(late[axes], _likeness(asked[:-lag, axes], moved[lag:]))
     least = max(LEAST_LIKENESS, ERRORS / np.sqrt(len(asked)))
     driven_axes = size > DRIVEN_SHARE * size.max()

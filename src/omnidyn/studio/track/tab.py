@@ -8,7 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
-from omnidyn.control.drawn import MOST
+from omnidyn.control.drawn import LONGEST_WINDOW
 from omnidyn.control.paths.path import OPTIONS
 from omnidyn.studio.elements import document, verdict
 from omnidyn.studio.page import Page
@@ -91,7 +91,7 @@ class TrackTab:
                 on_change=lambda e: smooth(None if e.value else slider.value),
             )
             value = 0.2 if tracks.smoothing is None else tracks.smoothing
-            slider = ui.slider(min=0.0, max=MOST, step=0.05, value=value, on_change=lambda e: smooth(e.value))
+            slider = ui.slider(min=0.0, max=LONGEST_WINDOW, step=0.05, value=value, on_change=lambda e: smooth(e.value))
             slider.props("aria-label='seconds over which corners are smoothed'").classes("smoothing")
             smooth(tracks.smoothing)
 
