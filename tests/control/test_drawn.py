@@ -5,7 +5,7 @@ import pytest
 
 import omnidyn
 from omnidyn.control.demand import path_demand
-from omnidyn.control.drawn import Smooth, least_smoothing, smoothed
+from omnidyn.control.drawn import MOST_ROWS, Smooth, least_smoothing, smoothed
 from omnidyn.control.paths.polyline import through
 
 CORNER = through([(0, 0), (1, 0), (1, 1)], 0.5, False, "corner")  # [m], at 0.5 m/s
@@ -51,3 +51,14 @@ def test_a_robot_gets_the_least_window_with_which_it_can_follow():
     assert follows(width)
     assert not follows(0.5 * width)
     assert least_smoothing(robot, through([(0, 0), (1, 0), (1, 1)], 0.05, False, "slow")) < width
+
+
+def test_a_path_that_takes_long_has_few_rows_and_keeps_its_corners():
+    """An hour; and months, of which nothing is smoothed: `track` refuses that in words."""
+    hour = through([(0, 0), (18, 0), (18, 18)], 0.01, False, "slow")
+    made = smoothed(hour, 0.8)
+    assert len(made.t) <= MOST_ROWS + 1
+    assert made.duration == pytest.approx(hour.duration)
+    np.testing.assert_allclose(made.at(hour.t[1]).pose[:2], [18.0, 0.0], atol=1e-2)
+    far = through([(0, 0), (1e4, 0), (1e4, 1e4)], 1e-3, False, "far")
+    assert smoothed(far, 1.6) is far

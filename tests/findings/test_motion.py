@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from omnidyn import Run, load_robot, simulate
+from omnidyn import check as check_run
 from omnidyn.findings.check import check, check_blocks
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Prior
+from tests.support.axebot_logs import excitation
 
 
 def test_saturation_and_its_share(log, robot, with_channels):
@@ -143,6 +146,21 @@ def test_guesses_of_a_robot_file_are_no_evidence_against_a_log(log, robot):
     (finding,) = check(log, guess).of("energy")
     assert finding.severity == "warning"
     assert "motor.emf_constant_Vs_rad of the robot file is only guessed" in str(finding)
+
+
+@pytest.mark.parametrize("late", [0.1, 0.2, 0.5])
+def test_the_latency_that_a_robot_file_says_takes_no_energy(late):
+    """A voltage that acts later brakes later; with a latency that the file has not, the rows are impossible."""
+    robot = load_robot("axebot")
+    run = simulate(robot, excitation(20.0, seed=1), 0.01)
+    noise = np.random.default_rng(0).standard_normal(run.twist.shape) * 0.01
+    twist = np.roll(run.twist, round(late / 0.01), axis=0) + noise
+    log = Run(t=run.t, voltage=run.voltage, twist=twist)
+    later = robot.replace(drive=robot.drive.replace(latency=late))
+    assert not [finding for finding in check_run(log, later).findings if finding.severity == "error"]
+    (finding,) = (f for f in check_run(log, robot).findings if f.severity == "error")
+    assert finding.code == "energy"
+    assert "how late a voltage acts" in finding.remedy_text
 
 
 def test_an_input_that_outruns_the_rows(log, with_channels):

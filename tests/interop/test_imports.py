@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import omnidyn
+from omnidyn.cli import main
 from omnidyn.errors import InputError, OmnidynError
 from omnidyn.export.bodies.mjcf import mjcf
 from omnidyn.export.bodies.urdf import urdf
@@ -62,6 +63,21 @@ def test_mecanum_wheels_come_back(kind, wheelbase, turned):
     assert again.body.inertia == pytest.approx(robot.body.inertia, rel=1e-9)
     assert again.priors["wheels.roller_angle_deg"].origin == "guess"
     assert again.priors["wheels.wheelbase_m"].origin == "imported"
+
+
+def test_a_robot_on_parallel_axles_is_said_to_be_taken_as_mecanum(tmp_path, capsys):
+    """One that turns by skidding looks the same: whoever reads it learns what was taken for granted."""
+    path = tmp_path / "skid.urdf"
+    path.write_text(urdf(MECANUM).text, "utf-8")
+    assert main(["import", "urdf", str(path), "-o", str(tmp_path / "robot.toml")]) == 0
+    said = capsys.readouterr()
+    for words in (said.err, " ".join(said.out.split()), omnidyn.load_robot(tmp_path / "robot.toml").source):
+        assert "taken as mecanum wheels" in words
+        assert "by skidding" in words
+    assert "warning" in said.err
+    path.write_text(urdf(ROBOT).text, "utf-8")
+    assert main(["import", "urdf", str(path)]) == 0
+    assert "warning" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["axebot", "mecanum", "four-wheel"])

@@ -124,3 +124,13 @@ def test_a_guess_that_has_no_width_stays_as_it_is():
     robot = parse_robot(told)
     assert robot.priors
     assert all(prior.std is None for key, prior in robot.priors.items() if "rotor" not in key)
+
+
+def test_a_supply_that_is_a_guess_is_as_wide_as_the_limit_of_the_voltage():
+    """As of a battery: from 1 to 100 V, as a friction is, none is."""
+    text = robot_to_toml(load_robot("four-wheel").replace(priors={}))
+    text = re.sub(r"\[drive\]\n(?:[^\[\n].*\n)*", "", text)
+    robot = parse_robot(
+        text + '\n[drive]\nkind = "duty"\nsupply_V = { value = 12.0, origin = "guess" }\n',
+    )
+    assert robot.priors["drive.supply_V"].std == 6.0

@@ -1,6 +1,8 @@
 """The history of fits, removals and undo, what a user may bring, and that no path of the server shows."""
 
 import asyncio
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -8,10 +10,14 @@ import pytest
 pytest.importorskip("nicegui", reason="the extra studio is not installed")
 
 import omnidyn
+from omnidyn.studio import calls
+from omnidyn.studio.calls import MAX_NAME
 from omnidyn.studio.compare.state import Comparing
 from omnidyn.studio.fit.state import Fitting
+from omnidyn.studio.script import script
 from omnidyn.studio.session import MAX_FILES, RefusedError, Session
 from omnidyn.studio.task import Task
+from omnidyn.studio.track.state import DRAWN, Tracks
 from omnidyn.studio.words import each_text, in_page_names
 from tests.studio.test_calls import Here
 from tests.support.pages import write_log
@@ -153,6 +159,82 @@ def test_the_words_of_the_library_have_the_names_of_the_page():
     told = each_text({"text": said, "columns": [{"column": "`hold_out`"}]}, in_page_names)
     assert told["columns"] == [{"column": "`hold_out`"}]
     assert "`" not in told["text"]
-    assert in_page_names("latency.twist is 0; twist[1] is not followed") == (
-        "latency of the speed over the ground is 0; vy is not followed"
+    for name in ("latency.csv", "latency.twist.csv", "twist[1].csv"):  # a file of a user stays as it is
+        assert in_page_names(f"{name}: 3 rows") == f"{name}: 3 rows"
+    assert in_page_names("latency.twist is 0; twist[1] is not followed; so is latency.heading.") == (
+        "latency of the speed over the ground is 0; vy is not followed; so is latency of the heading."
     )
+
+
+@pytest.mark.parametrize("name", ['ends in "', "x'", "a\\b", "ü", "n" * 400])
+def test_a_fit_is_told_apart_whatever_its_robot_is_called(session, name):
+    fitting, folder = Fitting(session), session.new_folder()
+    omnidyn.save_robot(omnidyn.load_robot("axebot").replace(name=name), folder / "robot.toml")
+    key = fitting.keep(Task(result={"verdict": "Good.", "failed": False}, folder=folder))
+    assert omnidyn.load_robot(session.robots[key]).name == f"{name[:MAX_NAME]}, fit-1"
+
+
+def test_a_second_click_on_remove_removes_nothing(session):
+    """Two clicks, or two pages: the file stays, for Undo brings it back."""
+    path = session.new_folder() / "a.csv"
+    log = session.add_log(str(write_log(path, 1.0)), path.name)
+    session.remove(log)
+    session.remove(log)
+    session.undo()
+    assert path.exists()
+    fitting = Fitting(session)
+    kept(session, fitting)
+    fitting.remove("fit-1.toml")
+    fitting.remove("fit-1.toml")
+    assert "removed" in fitting.rename("fit-1.toml", "other")
+    session.undo()
+    assert list(fitting.history) == ["fit-1.toml"]
+
+
+def test_a_robot_file_with_the_name_of_a_fit_that_was_removed_is_not_that_fit(session, tmp_path):
+    fitting = Fitting(session)
+    kept(session, fitting)
+    fitting.remove("fit-1.toml")
+    omnidyn.save_robot(omnidyn.load_robot("axebot"), tmp_path / "fit-1.toml")
+    session.add_robot(str(tmp_path / "fit-1.toml"), "fit-1.toml")
+    assert session.robot == "fit-1-2.toml"
+    assert session.is_editable("fit-1-2.toml")
+    assert not fitting.history
+    session.undo()
+    assert list(fitting.history) == ["fit-1.toml"]
+
+
+def test_two_logs_of_one_name_have_two_names_in_what_is_done_by_hand(session):
+    """Else a call would read one of them twice."""
+    logs = [session.add_log(str(write_log(session.new_folder() / "log.csv", 1.0, k)), "log.csv") for k in (1, 2)]
+    command, python = calls.fit(logs, logs[1:], "axebot", ())
+    assert [log.name for log in logs] == ["log.csv", "log-4.csv"]
+    assert "log.csv log-4.csv" in command
+    assert "'log-4.csv'" in python
+    assert logs[1].request["name"] == "log-4.csv"
+
+
+def test_the_script_runs_after_a_fit_was_renamed_and_with_a_drawn_path(session, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fitting, comparing, tracks = Fitting(session), Comparing(session), Tracks(session)
+    session.add_log(str(write_log(tmp_path / "log.csv", 4.0)), "log.csv")
+    kept(session, fitting, 2)
+    comparing.choose(0, "fit-1.toml")
+    comparing.choose_fits(["fit-1.toml", "fit-2.toml"])
+    asyncio.run(comparing.run())
+    tracks.choose(DRAWN)
+    tracks.draw([[0.0, 0.0], [0.5, 0.0]])
+    tracks.control(["pid"])
+    asyncio.run(tracks.run())
+    assert comparing.last.result
+    assert tracks.last.result
+    fitting.rename("fit-1.toml", "carpet")
+    fitting.remove("fit-2.toml")
+    work = script(fitting, {"compare": comparing.last, "track": tracks.last})
+    assert str(session.folder) not in work
+    with redirect_stdout(StringIO()) as out:
+        exec(compile(work, "work.py", "exec"), {})
+    for name, rmse in omnidyn.compare(omnidyn.load_robot("fit-1.toml"), omnidyn.read_log("log.csv")).rmse.items():
+        assert name in out.getvalue()
+        assert f"{rmse:.4g}" in out.getvalue()
+    assert "pid" in out.getvalue()

@@ -179,3 +179,15 @@ def test_a_log_that_is_a_folder_is_not_kept(make, tmp_path):
     studio.session.add_log(str(tmp_path), "bag")
     with pytest.raises(InputError, match=r"only files.*got bag.*remove it"):
         asyncio.run(studio.save())
+
+
+def test_a_workspace_from_before_there_were_notes_opens(make, tmp_path):
+    fit = {"name": "fit-1.toml", "verdict": "Good.", "failed": False, "robot": "fits/1-robot.toml"}
+    fit |= {"numbers": "fits/2-numbers.csv", "warnings": "fits/3-warnings.csv", "report": ""}
+    files = [(fit["robot"], b'name = "a"\n'), (fit["numbers"], b"number\n"), (fit["warnings"], b"severity,text\n")]
+    path = tmp_path / "old.zip"
+    path.write_bytes(archive([(workspace.MANIFEST, manifest(fits=[fit])), (LOG["file"], ROWS), *files]))
+    studio = make()
+    asyncio.run(studio.open(str(path), path.name))
+    assert list(studio.fitting.history) == ["fit-1.toml"]
+    assert studio.fitting.notes == {"fit-1.toml": ""}

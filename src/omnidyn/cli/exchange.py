@@ -42,6 +42,7 @@ def bring(
     What was read is marked as imported; what FILE does not say is guessed, with a wide spread, and marked as a guess.
     """
     from omnidyn.interop.kinds import import_robot
+    from omnidyn.interop.parts import ROLLERS
     from omnidyn.model.first_guess import guessed
     from omnidyn.model.robot_file import robot_to_toml
 
@@ -62,6 +63,8 @@ def bring(
         tell(robot.document(), json, provenance(inputs), output=out or None, guessed=guessed(robot))
     if guessed(robot):
         say(f"omnidyn: guessed: {', '.join(guessed(robot))}")
+    if any(prior.source == ROLLERS for prior in robot.priors.values()):
+        say(f"omnidyn: warning: {ROLLERS}")
     if not out:
         say("omnidyn: nothing written; -o FILE writes the robot file")
 

@@ -8,37 +8,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from omnidyn.arrays import FloatArray
 from omnidyn.control.demand import path_demand
-from omnidyn.control.paths.motion import Path, Reference
+from omnidyn.control.paths.motion import Reference
 from omnidyn.control.paths.polyline import Polyline, lines
 from omnidyn.model.robot import Robot
 
 WIDTHS = (0.1, 0.2, 0.4, 0.8, 1.6)  # [s] that are tried
-MOST = 2.0  # [s]
+LONGEST_WINDOW = 2.0  # [s]
 ROWS = 40  # of a window
+MOST_ROWS = 200_000  # of a path: of a long one a window has fewer, and one of less than two smooths nothing
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Smooth(Path):
+class Smooth(Polyline):
     """What a smoothed path means between its rows: velocity and acceleration are their central differences.
 
     t [s], evenly spaced, pose [m, m, rad], shape (rows, 3).
     """
-
-    name: str
-    t: FloatArray
-    pose: FloatArray
-
-    @property
-    def duration(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Until the last row [s]."""
-        return float(self.t[-1])
-
-    @property
-    def end(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """The last row [s]: it stays there."""
-        return float(self.t[-1])
 
     def at(self, t: ArrayLike) -> Reference:
         """See Path."""
@@ -55,12 +41,12 @@ def smoothed(path: Polyline, width: float, *, closed: bool = False) -> Polyline:
 
     closed: whether it goes on where it began, so that its first corner is smoothed too.
     """
-    if width <= 0.0:
+    step = max(width / ROWS, path.duration / MOST_ROWS)
+    half = int(width / (2.0 * step) + 1e-9)
+    if half < 1:
         return path
-    step = width / ROWS
     t = np.linspace(0.0, path.duration, max(2, round(path.duration / step) + 1))
-    pose, half = path.at(t).pose, ROWS // 2
-    half = max(1, min(half, len(t) - 1))
+    pose, half = path.at(t).pose, min(half, len(t) - 1)
     window = np.hanning(2 * half + 1)
     if closed:
         before, after = pose[-1 - half : -1], pose[1 : half + 1]

@@ -34,6 +34,9 @@ def check_energy(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     if voltage is None or robot is None or speed is None or voltage.shape != speed.shape or len(work) < 2:
         return [], work
     points = len(work) < MIN_ROWS and work.step >= 0.1
+    if robot.drive.latency and not points:  # what acts now was asked before
+        asked = np.searchsorted(work.t, work.t - robot.drive.latency + 1e-9, side="right") - 1
+        voltage = voltage[np.maximum(asked, 0)]
     mask, worst = _points(robot, voltage, speed) if points else _windows(work, robot, voltage, speed)
     if not mask.any() or mask.mean() < (0.0 if points else LEAST_SHARE):
         return [], work

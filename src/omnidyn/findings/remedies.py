@@ -63,7 +63,7 @@ def _inverted(finding: Finding, columns: Mapping[str, Column]) -> Columns | None
     numbers = finding.numbers
     if "wiring" in numbers:
         return _wired(finding, columns)
-    if "position" in numbers and not numbers["blamed"]:
+    if finding.remedy == "mixed" or ("position" in numbers and not numbers["blamed"]):
         return None
     return _turned_about(finding.subject.split(), columns)
 

@@ -29,7 +29,10 @@ LONGEST_NAMES = 150
 PLACEHOLDER = 1e-3  # of the robot: the mass of a wheel that stands for one of which nothing is known
 ROLLER_ANGLE = 45.0  # [degree] of a mecanum wheel, as nearly all have it
 MECANUM_CORNERS = {(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)}
-ROLLERS = "its axles are parallel: taken as mecanum wheels, rollers in an X seen from above"
+ROLLERS = (
+    "its axles are parallel: taken as mecanum wheels, rollers in an X seen from above; wheels without rollers, which "
+    "turn a robot by skidding, have no model here"
+)
 LARGEST_NUMBER = 1e9  # of any number of a part, in SI units
 
 
@@ -123,8 +126,9 @@ def _robot(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], where: str, 
         other_priors["wheels.roller_angle_deg"] = Prior(source=ROLLERS, origin=GUESS)
         imported_keys.add("wheels.wheelbase_m")
     joints = ", ".join(axle.name for axle in axles)[:LONGEST_NAMES]
+    said = f"; {ROLLERS}" * (corners is not None)
     return robot.replace(
-        source=f"imported from {where}; wheels: {joints}"[:400],
+        source=f"imported from {where[:100]}{said}; wheels: {joints}"[:400],
         priors=other_priors | dict.fromkeys(imported_keys, origin),
     )
 

@@ -62,6 +62,7 @@ SPREAD = {
     "motor.gear_ratio": 0.5,
     "motor.voltage_limit_V": 0.5,
     ROTOR: 1.0,
+    "drive.supply_V": 0.5,
 }
 FRICTION_SPREAD = 1.0
 LIKE_SPREAD = 0.3  # of what is taken over from another robot

@@ -112,7 +112,10 @@ def save_robot(robot: Robot, path: str | os.PathLike, force: bool = False) -> Pa
 
 
 def robot_to_toml(robot: Robot) -> str:
-    """The robot as the text of a robot file; `parse_robot` gives the same robot back, to the last bit."""
+    """The robot as the text of a robot file; `parse_robot` gives the same robot back, to the last bit.
+
+    A guess without a std gets one, see `with_spread`.
+    """
     head = [f"schema = {SCHEMA}", f"name = {toml_literal(robot.name)}"]
     if robot.source:
         head.append(f"source = {toml_literal(robot.source)}")

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import glob
+import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+MAX_NAME = 80  # characters of the name of a file
 
 
 @dataclass
@@ -161,3 +164,9 @@ def _robot(robot: str) -> tuple[str, str, str]:
 def _flag(*robots: str) -> list[str]:
     """How the command line names robots; "" for none."""
     return [word for name in robots if name for word in ("--robot", name)]
+
+
+def safe_name(name: str) -> str:
+    """A name of plain letters, without a folder, for a file that somebody else named."""
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "_", name.replace("\\", "/").rpartition("/")[2]).lstrip("._-")
+    return plain[-MAX_NAME:].lstrip("._-") or "file"

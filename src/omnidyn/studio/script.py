@@ -16,7 +16,10 @@ from omnidyn.studio.task import Task
 
 FILE_NAME = "work.py"
 HEAD = '''\
-"""The work of a session of omnidyn studio. Run it in the folder of the logs: python {name}"""
+"""The work of a session of omnidyn studio. Run it in a folder with the logs: python {name}
+
+It writes its maps, paths and robots there, over files of these names.
+"""
 
 from pathlib import Path
 
@@ -64,14 +67,13 @@ def script(fitting: Fitting, others: Mapping[str, Task]) -> str:
         lines += [*before, f"fit = {call}", "print(fit.headline)"]
         lines.append("print({name: float(value) for name, value in fit.estimate.value.items()})")
         lines.append(f"omnidyn.save_robot(fit.estimate.robot, {name!r}, force=True)")
-    for log in session.logs.values():
-        files.log(log, "now")
-    for name, path in session.robots.items():
-        if name not in fitting.history and path not in session.presets:
-            files.robot(path, session.presets, "now")
     for name, task in others.items():
         if task.python and task.result is not None:
-            *before, call = task.python.splitlines()
+            python = task.python
+            for file, path in task.files.items():
+                if path not in session.presets:
+                    python = python.replace(repr(file), repr(files.put(file, path, name)))
+            *before, call = python.splitlines()
             lines += ["", f"print({name!r})", *before, f"print({call})"]
     written = [f"Path({name!r}).write_text({text!r}, 'utf-8')" for name, text in files.texts.items()]
     return "\n".join([HEAD.format(name=FILE_NAME), *written, *lines, ""])

@@ -21,7 +21,7 @@ import omnidyn
 from omnidyn.errors import InputError
 from omnidyn.model.presets import robot_path
 from omnidyn.progress import Report
-from omnidyn.studio.calls import LogFile
+from omnidyn.studio.calls import LogFile, safe_name
 from omnidyn.studio.parts import COMPARE, FIT, LOGS, PROGRESS, ROBOT, TRACK
 from omnidyn.studio.removed import Removed
 from omnidyn.studio.series import META, Series
@@ -34,7 +34,6 @@ TOO_LARGE = (
     "Name it on the command line instead."
 )
 ROBOT_SUFFIX = ".toml"
-MAX_NAME = 80
 
 
 class RefusedError(Exception):
@@ -105,6 +104,8 @@ class Session:
     def add_log(self, path: str, name: str) -> LogFile:
         """Take a log and check it."""
         self.count += 1
+        if any(other.name == name and other.path != path for other in self.logs.values()):
+            name = f"{Path(name).stem}-{self.count}{Path(name).suffix}"  # calls name a log by its file
         log = LogFile(f"log{self.count}", name, path)
         if any(other.stem == log.stem for other in self.logs.values()):
             log.stem = f"{log.stem}-{self.count}"
@@ -179,7 +180,8 @@ class Session:
 
     def remove(self, log: LogFile) -> None:
         """Take a log away; one that was uploaded is deleted when something else is removed, and can be brought back."""
-        self.logs.pop(log.key, None)
+        if self.logs.pop(log.key, None) is None:  # by another click already
+            return
 
         def restore() -> None:
             self.logs[log.key] = log
@@ -351,20 +353,22 @@ class Session:
 
     def remove_robot(self, name: str) -> None:
         """Take a robot file away; it can be brought back."""
+        if name not in self.robots:  # by another click already
+            return
         path, chosen = self.robots.pop(name), self.robot == name
         self.robot = self.robot * (not chosen)
 
         def restore() -> None:
-            self.robots[back := self.free_name(name)] = path
+            self.robots[back := self.free_name(name) if name in self.robots else name] = path
             self.robot = back if chosen and not self.robot else self.robot
 
         self._remove(Removed(name, restore, lambda: None))
 
     def free_name(self, name: str) -> str:
-        """The name, or the next one that no robot has yet."""
+        """The name, or the next one that no robot has yet, and no fit had: it may come back."""
         stem, _, suffix = name.rpartition(".")
         others = (f"{stem}-{k}.{suffix}" for k in itertools.count(2))
-        return next(free for free in itertools.chain((name,), others) if free not in self.robots)
+        return next(free for free in itertools.chain((name,), others) if free not in (self.robots.keys() | self.made))
 
     def choose(self, name: str) -> None:
         """Choose a robot; logs are checked with it."""
@@ -373,9 +377,3 @@ class Session:
             for log in self.logs.values():
                 self.start(self.check(log))
             self.changed(ROBOT, FIT)
-
-
-def safe_name(name: str) -> str:
-    """A name of plain letters, without a folder, for a file that somebody else named."""
-    plain = re.sub(r"[^A-Za-z0-9._-]+", "_", name.replace("\\", "/").rpartition("/")[2]).lstrip("._-")
-    return plain[-MAX_NAME:].lstrip("._-") or "file"

@@ -18,7 +18,8 @@ def progress_of(part: str) -> str:
 
 @dataclass
 class Task:
-    """A job. result: of it; error: in words. folder: of its files. command, python: that do the same.
+    """A job. result: of it; error: in words. folder: of its files. command, python: that do the same, with
+    files: their names in these -> paths.
 
     stopped: whether it was cancelled, or its process ended, before there was a result. cancelling: whether that was
     asked for. running, progress, share, spent, left [s]: while it goes on. series: of its signals, by the names of
@@ -38,6 +39,7 @@ class Task:
     series: dict[str, str] = field(default_factory=dict)
     command: str = ""
     python: str = ""
+    files: dict[str, str] = field(default_factory=dict)
 
     def end(self, session: Session) -> None:
         """Forget its signals."""

@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable
 from typing import Any
 
+from omnidyn.sensors import SENSORS
+
 PAGE_NAMES = {  # option of a call -> where a page has it
     "assume": "--assume",
     "column": "Columns and units (tab Log)",
@@ -18,7 +20,9 @@ PAGE_NAMES = {  # option of a call -> where a page has it
 AS_WRITTEN = ("columns", "numbers", "reading", "unused", "values")  # of a result: no words of the library
 AXES = ("vx", "vy", "omega")
 CHANNEL_NAMES = {"twist": "speed over the ground", "wheel_speed": "wheel speeds", "wheel_angle": "wheel angles"}
-_LATENCY, _TWIST = re.compile(r"\blatency\.([a-z_]+)"), re.compile(r"\btwist\[([0-2])\]")
+LATE = (*SENSORS, "heading", "position")
+_LATENCY = re.compile(rf"\blatency\.({'|'.join(LATE)})\b(?!\.\w)")  # no file that is called latency.csv
+_TWIST = re.compile(r"\btwist\[([0-2])\](?!\.\w)")
 _OPTION = re.compile(r"`([a-z]+(?:_[a-z]+)*)`")
 _NESTED = re.compile(r"\(([^()]*) \(([^()]*)\)\)")
 

@@ -22,8 +22,9 @@ from typing import Any
 from omnidyn.errors import InputError
 from omnidyn.files import open_regular
 from omnidyn.statement import ERROR, NOTE
+from omnidyn.studio.calls import safe_name
 from omnidyn.studio.fit.state import Fitting
-from omnidyn.studio.session import MAX_BYTES, MAX_FILE_BYTES, MAX_FILES, Session, safe_name
+from omnidyn.studio.session import MAX_BYTES, MAX_FILE_BYTES, MAX_FILES, Session
 from omnidyn.studio.task import Task
 
 SUFFIX, FILE_NAME = ".zip", "workspace.zip"
@@ -185,6 +186,8 @@ def _entries(value: Any, kind: str) -> list[dict[str, Any]]:
         raise _none(f"{kind} of another form", f"a list of at most {MAX_FILES}")
     types = {**dict.fromkeys((*text, *files, *absent), str), **dict.fromkeys(flags, bool)}
     for entry in value:
+        if kind == "fits" and isinstance(entry, dict):
+            entry.setdefault("note", "")  # a workspace from before there were notes
         if not isinstance(entry, dict) or {key: type(item) for key, item in entry.items()} != types:
             raise _none(f"an entry of {kind} of another form", ", ".join(types))
         if not all(entry[key] for key in files):

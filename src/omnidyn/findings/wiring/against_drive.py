@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import volts
@@ -13,7 +14,8 @@ from omnidyn.model.motor import no_load_speed
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.statement import ERROR
 
-LEAST_LIKENESS = 0.5  # clean logs have 0.6 and more
+LEAST_LIKENESS = 0.5  # clean logs have 0.57 and more
+LAGS = 4  # windows by which the motion may be late: a voltage that goes to and fro is half a turn late at one of them
 ERRORS = 5.0  # standard errors of the likeness of two signals that have nothing to do with each other
 DRIVEN_SHARE = 0.15  # of the axis that is driven most: another one says nothing
 BY_AZIMUTH = ("wheels.azimuth_deg",)
@@ -34,20 +36,29 @@ def check_against_drive(work: LogUnderCheck) -> tuple[list[Finding], LogUnderChe
     if not len(asked):
         return [], work
     size = np.sqrt((asked**2).sum(axis=0))
-    wide = np.sqrt((moved**2).sum(axis=0))
-    likeness = np.ones(3)
-    likeness[axes] = (asked[:, axes] * moved).sum(axis=0) / np.maximum(size[axes] * wide, 1e-300)
+    likeness, late = np.ones(3), np.zeros(3)
+    likeness[axes] = _likeness(asked[:, axes], moved)
+    for lag in range(1, min(LAGS + 1, len(asked))):
+        late[axes] = np.maximum(late[axes], _likeness(asked[:-lag, axes], moved[lag:]))
     least = max(LEAST_LIKENESS, ERRORS / np.sqrt(len(asked)))
-    turned = (likeness < -least) & (size > DRIVEN_SHARE * size.max())
+    driven_axes = size > DRIVEN_SHARE * size.max()
+    turned = (likeness < -least) & (late < LEAST_LIKENESS) & driven_axes
     if not turned.any():
         return [], work
+    mixed = bool((np.abs(likeness) < LEAST_LIKENESS)[driven_axes].any())  # a sign leaves the other axes as they are
     names = [name for name, is_turned in zip(components("twist", 0), turned, strict=True) if is_turned]
     finding = Finding(
         "inverted",
         ERROR,
         " ".join(names),
         {"likeness": float(likeness[turned].max())},
-        "drive",
+        "mixed" if mixed else "drive",
         rests_on=BY_AZIMUTH,
     )
-    return [finding], work.replace(twist=twist * np.where(turned, -1.0, 1.0))
+    return [finding], work if mixed else work.replace(twist=twist * np.where(turned, -1.0, 1.0))
+
+
+def _likeness(asked: FloatArray, moved: FloatArray) -> FloatArray:
+    """Cosine between each column of the one and that of the other."""
+    sizes = np.sqrt((asked**2).sum(axis=0) * (moved**2).sum(axis=0))
+    return (asked * moved).sum(axis=0) / np.maximum(sizes, 1e-300)

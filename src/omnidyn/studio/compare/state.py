@@ -83,9 +83,11 @@ class Comparing:
             return
         self.last.end(self.session)
         command, python = self.calls()
-        self.last = Task(command=command, python=python)
+        robots = [self.session.robots[name] for name in self.robots if name]
+        files = {Path(robot).name: robot for robot in robots} | {log.map_name: log.map for log in self.logs if log.map}
+        self.last = Task(command=command, python=python, files=files)
         request = {
-            "robots": [self.session.robots[name] for name in self.robots if name],
+            "robots": robots,
             "logs": [log.request for log in self.logs],
         }
         await self.last.run(self.session, COMPARE, COMPARE, "compare", request)
@@ -100,6 +102,7 @@ class Comparing:
         if self.last_drift.running:
             return
         command, python = self.drift_calls()
-        self.last_drift = Task(command=command, python=python)
-        request = {"fits": [self.session.robots[name] for name in self.fits], "names": self.fits}
+        fits = [self.session.robots[name] for name in self.fits]
+        self.last_drift = Task(command=command, python=python, files={Path(fit).name: fit for fit in fits})
+        request = {"fits": fits, "names": self.fits}
         await self.last_drift.run(self.session, DRIFT, COMPARE, "drift", request)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from dataclasses import dataclass, replace
 from typing import Any
 
+from omnidyn.model.robot_file import toml_literal
 from omnidyn.studio import calls
-from omnidyn.studio.calls import LogFile
+from omnidyn.studio.calls import MAX_NAME, LogFile
 from omnidyn.studio.parts import FIT, FITTED, FREE, HELD_OUT, LEFT_OUT, ROBOT
 from omnidyn.studio.robot.rename import rename_robot
 from omnidyn.studio.session import Session
@@ -154,12 +156,7 @@ class Fitting:
         assert fit.folder is not None
         name = self.session.free_name(name or f"fit-{len(self.fits) + 1}.toml")
         path, text = fit.folder / name, (fit.folder / "robot.toml").read_text("utf-8")
-        of = NAME.search(text)
-        if of:  # two fits of one robot are told apart by their names
-            stem = path.stem
-            before = of[0].partition("=")[2].strip().strip("\"'").partition(", fit-")[0]
-            text = NAME.sub(lambda _: f'name = "{before}, {stem}"', text, count=1)
-        path.write_text(text, "utf-8")
+        path.write_text(NAME.sub(lambda line: _named(line[0], path.stem), text, count=1), "utf-8")
         self.fits[name] = fit
         self.session.robots[name] = str(path)
         self.session.made.add(name)
@@ -199,3 +196,12 @@ class Fitting:
     def remove(self, name: str) -> None:
         """Take a fit and its robot away; it can be brought back."""
         self.session.remove_robot(name)
+
+
+def _named(line: str, stem: str) -> str:
+    """The line of a robot file that names the robot: two fits of one robot are told apart by their names."""
+    try:
+        before = tomllib.loads(line)["name"].partition(", fit-")[0]
+    except (tomllib.TOMLDecodeError, AttributeError):
+        return line
+    return f"name = {toml_literal(f'{before[:MAX_NAME]}, {stem}')}"

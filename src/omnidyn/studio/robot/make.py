@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import sys
 
-from omnidyn.studio.session import ROBOT_SUFFIX, Session, safe_name
+from omnidyn.studio.calls import safe_name
+from omnidyn.studio.session import ROBOT_SUFFIX, Session
 from omnidyn.studio.worker import EndedError
 
 

@@ -102,7 +102,11 @@ class Tracks:
             return
         self.last.end(self.session)
         command, python = self.calls()
-        self.last = Task(command=command, python=python)
+        robots = [self.session.robot_path, *filter(None, [self.session.robots.get(self.plant, "")])]
+        files = {Path(robot).name: robot for robot in robots}
+        given = {name: path for name, path in self.controller_files.items() if name in self.controllers}
+        files |= {name: path for name, path in given.items() if name.lower().endswith(ROBOT_SUFFIX)}  # text
+        self.last = task = Task(command=command, python=python, files=files)
         file = self.path_files.get(self.path, "")
         request = {
             "robot": self.session.robot_path,
@@ -116,7 +120,9 @@ class Tracks:
             "controllers": [self.controller_files.get(name, name) for name in self.controllers],
             "sensors": self.sensors.strip(),
         }
-        await self.last.run(self.session, TRACK, TRACK, "track", request)
+        await task.run(self.session, TRACK, TRACK, "track", request)
+        if request["points"] and task.folder is not None and task.result is not None:
+            task.files[DRAWN] = str(task.folder / DRAWN)
 
 
 def _number(text: str) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
-from omnidyn.control.drawn import MOST
+from omnidyn.control.drawn import LONGEST_WINDOW
 from omnidyn.control.paths.path import OPTIONS
 from omnidyn.studio.elements import document, verdict
 from omnidyn.studio.page import Page
@@ -81,8 +81,8 @@ class TrackTab:
 
             def smooth(value: float | None) -> None:
                 tracks.smoothing = value
-                said = "as much as the robot needs" if value is None else f"over {value:g} s" if value else "as drawn"
-                words.set_text(f"Corners are smoothed {said}." if value != 0.0 else "Corners stay as drawn.")
+                said = "as much as the robot needs" if value is None else f"over {value:g} s"
+                words.set_text("Corners stay as drawn." if value == 0.0 else f"Corners are smoothed {said}.")
                 slider.set_enabled(value is not None)
 
             ui.checkbox(
@@ -90,9 +90,8 @@ class TrackTab:
                 value=tracks.smoothing is None,
                 on_change=lambda e: smooth(None if e.value else slider.value),
             )
-            slider = ui.slider(
-                min=0.0, max=MOST, step=0.05, value=tracks.smoothing or 0.2, on_change=lambda e: smooth(e.value)
-            )
+            value = 0.2 if tracks.smoothing is None else tracks.smoothing
+            slider = ui.slider(min=0.0, max=LONGEST_WINDOW, step=0.05, value=value, on_change=lambda e: smooth(e.value))
             slider.props("aria-label='seconds over which corners are smoothed'").classes("smoothing")
             smooth(tracks.smoothing)
 

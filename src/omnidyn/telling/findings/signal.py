@@ -229,8 +229,8 @@ SENTENCES = {
     "energy": Sentence(
         "the motors would take up to {worst_W:.3g} W out of the robot while it does not slow down: the back-EMF is "
         "{emf_over_voltage:.3g} times the voltage applied",
-        "these rows cannot be of this robot file: check K, gear ratio, wheel and robot radius, and the units of "
-        "voltage and speed",
+        "these rows cannot be of this robot file: check K, gear ratio, wheel and robot radius, the units of voltage "
+        "and speed, and how late a voltage acts (drive.latency_s)",
     ),
     "not_excited": Sentence(_not_excited, _not_excited_remedy),
     "one_way": Sentence(

@@ -72,8 +72,13 @@ def _inverted(statement: Statement) -> str:
     if "likeness" in n:
         names = subject.split()
         goes, has = by_number(names, "goes", "go"), by_number(names, "it has", "they have")
-        return f"{' and '.join(names)} {goes} the other way than the voltages drive the robot (likeness \
-{n['likeness']:.2f}): {has} the opposite sign, or the motors are in another order than in the robot file"
+        against = f"{' and '.join(names)} {goes} the other way than the voltages drive the robot (likeness \
+{n['likeness']:.2f})"
+        if statement.remedy == "mixed":
+            return f"{against}, and another axis does not follow them either: the motors are in another order, or have \
+another sign, than in the robot file"
+        signs = f"{has} the opposite sign{', or the voltages have it' * (len(names) == 3)}"
+        return f"{against}: {signs}, or the motors are in another order than in the robot file"
     return f"{subject} goes the other way than the wheels say ({n['ratio']:.3g} +-{n['error']:.2g} of it): it has the \
 opposite sign, or all wheels have"
 
@@ -139,8 +144,10 @@ SENTENCES = {
         _inverted_remedy,
         {
             **OF_WHEELS,
-            "drive": "set `invert` for that column in the mapping; where all logs show it, put the wheels of the robot "
-            "file in the order of the motors",
+            "drive": "set `invert` for {subject:that column|these columns} in the mapping; where all logs show it, put "
+            "the wheels of the robot file in the order of the motors",
+            "mixed": f"{SLOTS}, with `invert` for the wrong signs, or put the wheels of the robot file in the order of "
+            "the motors",
         },
     ),
     "marker_angle": Sentence(_marker_angle, "take the angle off: `assume` marker={angle_deg:.1f}deg"),
