@@ -114,6 +114,27 @@ def test_what_it_does_not_take(call, here, arguments, words):
     assert words in err
 
 
+def test_a_wrong_key_is_refused_before_the_drive(call, here):
+    (here / "log.csv").write_text("t_s\n")
+    code, out, err = call("watch", "log.csv", "--robot", "axebot", "--free", "friction.axis", "--idle", "0.2")
+    assert (code, out) == (3, "")
+    assert "unknown key; got friction.axis" in err
+
+
+def test_standard_input_that_is_closed_or_empty(call, here, monkeypatch):
+    monkeypatch.setattr("sys.stdin", None)
+    code, _, err = call("watch", "-", "--robot", "axebot")
+    assert code == 3
+    assert "standard input is closed; expected rows of text; pipe them in" in err
+    (here / "rows").write_text("")
+    with (here / "rows").open() as stream:
+        monkeypatch.setattr("sys.stdin", stream)
+        code, out, _ = call("watch", "-", "--robot", "axebot")
+    assert code == 4
+    assert "after 0 s and 0 rows" in out
+    assert "number  key" not in out
+
+
 def test_a_robot_with_a_speed_loop_is_refused(call, here):
     (here / "log.csv").write_text("t_s\n")
     code, _, err = call("watch", "log.csv", "--robot", "robotino")

@@ -18,7 +18,7 @@ from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.prepare import free_by_default, guesses
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH
 from omnidyn.model.drive import SPEED
-from omnidyn.model.keys import expand
+from omnidyn.model.keys import Key, expand
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
@@ -79,7 +79,7 @@ class Live:
             )
         self.robot, self.reference = robot, reference
         self.method = method or _default_method(robot, reference is not None)
-        self._within = _shares(within)
+        self._within = _shares(within, robot, self.method)
         self._rows, self._model = Rows(), None
         self._start = self._answered = math.nan
         self._fitted_rows, self._fitted_at = 0, 0.0
@@ -150,16 +150,20 @@ class Live:
         if now - model.start < STRETCH:
             return
         self._held_out = model.judge(now)
-        if self._enough_at is None and self._was_reached and self._held_out.predicted and self._is_reached():
-            self._enough_at = now - self._start
+        seems_enough = self._was_reached and self._held_out.predicted and self._is_reached()
         model.close(now)
         age, is_small = now - self._start, self._rows.count <= FIT_ROWS
         has_grown = age >= GROWTH * (self._fitted_at - self._start) and self._fitted_rows < FIT_ROWS
-        if has_grown or (self._held_out.missed and age >= SOONER * (self._fitted_at - self._start)):
+        is_doubtful = bool(self._held_out.missed) or (seems_enough and self._enough_at is None)
+        if has_grown or (is_doubtful and age >= SOONER * (self._fitted_at - self._start)):
             self._fit(now)
         elif is_small or (model.moved > MOVED and age >= SOONER * (model.fitted_at - self._start)):
             model.linearise(self._rows, now)
         self._was_reached = self._is_reached()
+        if self._held_out.missed or self._model.misfit:
+            self._enough_at = None
+        elif self._enough_at is None and seems_enough and self._was_reached:
+            self._enough_at = age
         if self._rows.count > MOST_ROWS:
             self._model.freeze()
             self._rows.forget(self._model.start - STRETCH)
@@ -208,6 +212,7 @@ class Live:
             numbers=self._numbers(),
             held_out=self._held_out,
             enough_at=self._enough_at,
+            misfit=self._model.misfit,
             changes=changed,
             waiting="",
         )
@@ -220,9 +225,20 @@ def _default_method(robot: Robot, is_compared: bool) -> OutputError:
     return OutputError(free=tuple(dict.fromkeys(keys)), nuisances=(LATENCY, PUSH))
 
 
-def _shares(within: object) -> dict[str, float]:
-    """Key -> share; "" for all numbers of the robot. Raises InputError for what is no share."""
-    shares = dict(within) if isinstance(within, Mapping) else {"": within}
+def _shares(within: object, robot: Robot, method: OutputError) -> dict[str, float]:
+    """Key -> share; "" for all numbers of the robot. Raises InputError for what is no share, and for a key that is not
+    fitted: it would be waited for in vain, or not at all."""
+    names = (*free_by_default(robot), *guesses(robot)) if method.free is None else method.free
+    fitted = [str(Key.parse(key)) for name in names for key in expand(name, robot)]
+    shares = {}
+    for name, share in within.items() if isinstance(within, Mapping) else [("", within)]:
+        shares |= dict.fromkeys(expand(name, robot), share)
+    for name in shares:
+        if name and name not in fitted and name.partition(".")[0] not in method.nuisances:
+            raise InputError(
+                "not fitted", got=name, expected=", ".join(fitted), remedy="free it, or leave it out of `within`",
+                where="within",
+            )  # fmt: skip
     for name, share in shares.items():
         if not is_number(share) or not 0.0 < share < math.inf:  # type: ignore[operator]
             raise InputError(
