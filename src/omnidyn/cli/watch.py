@@ -91,6 +91,10 @@ def watch(
             is_over(table.end())
     except KeyboardInterrupt:
         say("omnidyn: ended")
+    except InputError:  # what was learnt before it is shown
+        if live.status.numbers and not json:
+            tell(live.status.document(), False, provenance([robot_input(robot)]))
+        raise
     if table.bad_rows > told_bad:
         _tell_bad(table)
     status = live.status

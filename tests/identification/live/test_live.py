@@ -170,7 +170,7 @@ def test_a_robot_at_rest_has_no_numbers_and_says_why():
     status = fed(run).status
     assert not status.numbers
     assert "never visibly moved" in status.waiting
-    assert "no numbers yet after 7 s" in str(status.verdict)
+    assert "no numbers yet after 8 s and 800 rows" in str(status.verdict)
 
 
 def test_gaps_restarts_and_missing_values_are_survived_and_said(log, live):

@@ -26,6 +26,7 @@ RESISTANCE = "motor.resistance_ohm"
 EVERY = 1.0  # [s] of the log between two answers
 STRETCH = 5.0  # [s] whose rows are predicted before they count
 FIRST = 4.0  # [s] of the log before the first fit
+SURE = 10.0  # [s] of the log in a whole fit that may say that the model leaves something out
 GROWTH, SOONER = 2.0, 1.15  # times as much log at which all is fitted anew; where that seems to be needed
 MOVED = 0.2  # standard errors that a number of a long log may move before all rows are taken anew
 FIT_ROWS = 8_000  # rows of a whole fit: with so many, the noise is known
@@ -138,6 +139,8 @@ class Live:
                 self._update(self._answered)
                 self._status = self._answer()
                 yield self._status
+        if self._model is None:
+            self._status = self._answer()
 
     def _update(self, now: float) -> None:
         if self._model is None:
@@ -212,7 +215,7 @@ class Live:
             numbers=self._numbers(),
             held_out=self._held_out,
             enough_at=self._enough_at,
-            misfit=self._model.misfit,
+            misfit=self._model.misfit if self._fitted_at - self._start >= SURE else (),
             changes=changed,
             waiting="",
         )
