@@ -113,7 +113,7 @@ def test_numbers_that_do_not_predict_are_not_enough(exact):
         if status.held_out.missed:
             break
     assert status.held_out.missed
-    assert not status.is_enough
+    assert status.enough_at is None
     assert "not yet" in str(status.verdict)
 
 
@@ -146,6 +146,8 @@ def test_an_unknown_width_is_said_in_words_and_percents_have_no_exponent():
     status = LiveStatus("robot", 9.0, 900, {"friction.axes.viscous[0]": number})
     assert str(status.verdict).endswith("viscous friction forward is not within 100 %, wanted 10 %")
     assert "e+" not in str(status)
+    late = LiveStatus("robot", 9.0, 900, {"friction.axes.viscous[0]": number}, enough_at=5.0)
+    assert not late.is_enough  # a number that is wide again
     assert "interval" not in str(LiveStatus("robot", waiting="no rows"))
 
 
