@@ -122,7 +122,7 @@ def test_numbers_are_shown_though_a_file_of_another_robot_takes_the_place(call, 
     code, out, err = call("watch", "log.csv", "--robot", "axebot", "--idle", "5")
     assert code == 3
     assert "more wheels than the robot; got 4 wheels; expected 3" in err
-    assert "Coulomb friction forward" in out
+    assert "95 % interval" in out
 
 
 def test_times_that_are_too_short_are_seen(call, here, lines):

@@ -1,7 +1,8 @@
 """A text file that is still being written: its rows as Runs, as they come.
 
 Only whole lines are taken. Which column is what is decided once, from the first rows; what stands above them belongs to
-all. Later a line that holds no row (half written, binary), and rows without numbers, are left out and counted. A clock that begins anew begins a Run of its own.
+all. Later a line that holds no row (half written, binary), and rows without numbers, are left out and counted. A clock
+that begins anew begins a Run of its own.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ class GrowingTable:
                 first = int(table.lines[0]) - 1
                 self._head = lines[:first]
                 lines = self._without_head(lines[first:])
-                self.columns = map_columns(table, self.robot, self.options)
+            self.columns = self.columns or map_columns(table, self.robot, self.options)
             log = log_from_table(table, self.columns, self.robot, self.options, self._clock)
             runs = [part.to_run() for part in log.recordings() if len(part)]
         except InputError:

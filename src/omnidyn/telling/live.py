@@ -45,7 +45,8 @@ SENTENCES = {
     "live_not_yet": Sentence(_not_yet),
     "live_not_predicted": Sentence(_not_predicted, "drive on; where it stays so, fit the log with identify"),
     "live_not_this_model": Sentence(
-        "not yet: the numbers are known, but the model leaves something out", "fit the log with identify: it looks for what"
+        "not yet: the numbers are known, but the model leaves something out",
+        "fit the log with identify: it looks for what",
     ),
     "live_misfit": Sentence(_misfit, "fit the log with identify: it looks for what"),
     "live_enough": Sentence(

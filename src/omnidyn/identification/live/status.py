@@ -46,8 +46,8 @@ class LiveStatus(Displayable):
     robot: its name. seconds [s], rows: how much came. numbers: key -> the number now. held_out: the last stretch that
     was predicted before it counted. enough_at [s]: when all numbers that must be were known and such a stretch was
     predicted, None before, and again once a stretch is not. misfit: what the residuals of the last whole fit follow,
-    nothing where the model leaves nothing out. restarts: of the clock of the log. gap [s]: the longest between two rows. waiting: why there
-    are no numbers yet. changes: what is no longer as in the fit before.
+    nothing where the model leaves nothing out. restarts: of the clock of the log. gap [s]: the longest between two
+    rows. waiting: why there are no numbers yet. changes: what is no longer as in the fit before.
     """
 
     robot: str
@@ -126,12 +126,11 @@ class LiveStatus(Displayable):
             )
             for name, number in self.numbers.items()
         ]
-        parts = [
-            *([Table(("number", "key", "now", "95 % interval", "+- %", "enough"), rows, "<<><><", name="numbers")] if rows
-              else []),
-            Points(self.statements()),
-        ]  # fmt: skip
-        return Document(parts, as_verdict(self.verdict) | self.to_dict(), verdict=self.verdict)
+        table = Table(("number", "key", "now", "95 % interval", "+- %", "enough"), rows, "<<><><", name="numbers")
+        parts = [table] if rows else []
+        return Document(
+            [*parts, Points(self.statements())], as_verdict(self.verdict) | self.to_dict(), verdict=self.verdict
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""

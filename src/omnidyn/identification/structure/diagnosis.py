@@ -116,7 +116,7 @@ def examine(solution: Solution) -> Examined:
     return Examined(diagnosis, memory, len(candidate_trials), count)
 
 
-def _shown(solution: Solution) -> tuple[Parts, Sequence[DrivenMotion], FitRows]:
+def _shown(solution: Solution) -> tuple[list[Parts], Sequence[DrivenMotion], FitRows]:
     """Residuals of a fit at its best point, the motion beside them, and both as rows that are not too many."""
     solver, point = solution.solver, solution.state.point
     decimated = Decimated.of(with_levels(solver.problem, point, levels_of(solution)))
