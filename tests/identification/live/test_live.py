@@ -226,6 +226,10 @@ def test_what_cannot_be_used_is_refused():
         omnidyn.Live(ROBOT, within=-1)
     with pytest.raises(omnidyn.OmnidynError, match=r"within: not fitted; got body.mass_kg; expected friction.axes.v"):
         omnidyn.Live(ROBOT, within={"body.mass_kg": 0.1})  # else nothing need be known, and all is enough
+    with pytest.raises(
+        omnidyn.OmnidynError, match="fit before is of another robot; got 4 wheels; expected 3, as axebot"
+    ):
+        omnidyn.Live(ROBOT, reference=omnidyn.load_robot("mecanum"))
     with pytest.raises(omnidyn.OmnidynError, match="unknown key; got nonsense"):
         omnidyn.Live(ROBOT, omnidyn.OutputError(free=("nonsense",)))
     with pytest.raises(omnidyn.OmnidynError, match=r"speed loop.*expected drive kind voltage or duty"):

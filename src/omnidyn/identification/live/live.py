@@ -78,6 +78,14 @@ class Live:
                 remedy="log what reaches the motors, or fit the whole log with identify",
                 where="robot",
             )
+        if reference is not None and reference.wheels.count != robot.wheels.count:
+            raise InputError(
+                "the fit before is of another robot",
+                got=f"{reference.wheels.count} wheels",
+                expected=f"{robot.wheels.count}, as {robot.name} has",
+                remedy="give a fit of this robot",
+                where="reference",
+            )
         self.robot, self.reference = robot, reference
         self.method = method or _default_method(robot, reference is not None)
         self._within = _shares(within, robot, self.method)
