@@ -175,6 +175,13 @@ def test_a_robot_at_rest_has_no_numbers_and_says_why():
     assert "no numbers yet after 8 s and 800 rows" in str(status.verdict)
 
 
+def test_what_a_dead_sensor_does_not_show_is_unknown_and_never_enough(log):
+    twist = log.twist * np.array([1.0, 0.0, 0.0])
+    status = fed(omnidyn.Run(t=log.t, voltage=log.voltage, twist=twist), omnidyn.Live(WRONG, within=0.5)).status
+    assert not status.is_enough
+    assert {BOX[1], BOX[2], BOX[4], BOX[5]} <= {*status.unknown} & {*status.missing}
+
+
 def test_gaps_restarts_and_missing_values_are_survived_and_said(log, live):
     twist, voltage = log.twist.copy(), log.voltage.copy()
     twist[700:720], voltage[900:903] = np.nan, np.nan

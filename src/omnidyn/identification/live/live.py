@@ -88,7 +88,8 @@ class Live:
             )
         self.robot, self.reference = robot, reference
         self.method = method or _default_method(robot, reference is not None)
-        self._within = _shares(within, robot, self.method)
+        self._fitted = _fitted(robot, self.method)
+        self._within = _shares(within, self._fitted, self.method)
         self._rows, self._model = Rows(), None
         self._start = self._answered = math.nan
         self._fitted_rows, self._fitted_at = 0, 0.0
@@ -207,6 +208,12 @@ class Live:
         for name, value, is_unknown in zip(model.problem.names, model.values.tolist(), model.unknown, strict=True):
             within = self._within.get(name, self._within.get("", 0.0) if name in robot_names else 0.0)
             numbers[name] = LiveNumber(value, std[name], *ci95[name], within, bool(is_unknown))
+        for name in self._fitted:  # what the fit held, such as friction along an axis that never moved
+            if name not in numbers:
+                within = self._within.get(name, self._within.get("", 0.0))
+                numbers[name] = LiveNumber(
+                    float(Key.parse(name).get(self.robot)), math.inf, -math.inf, math.inf, within, True
+                )
         return numbers
 
     def _answer(self) -> LiveStatus:
@@ -236,14 +243,16 @@ def _default_method(robot: Robot, is_compared: bool) -> OutputError:
     return OutputError(free=tuple(dict.fromkeys(keys)), nuisances=(LATENCY, PUSH))
 
 
-def _shares(within: object, robot: Robot, method: OutputError) -> dict[str, float]:
+def _fitted(robot: Robot, method: OutputError) -> list[str]:
+    """The numbers of the robot that are asked for. Raises InputError for a name that is none."""
+    names = (*free_by_default(robot), *guesses(robot)) if method.free is None else method.free
+    return [str(Key.parse(key)) for name in names for key in expand(name, robot)]
+
+
+def _shares(within: object, fitted: list[str], method: OutputError) -> dict[str, float]:
     """Key -> share; "" for all numbers of the robot. Raises InputError for what is no share, and for a key that is not
     fitted: it would be waited for in vain, or not at all."""
-    names = (*free_by_default(robot), *guesses(robot)) if method.free is None else method.free
-    fitted = [str(Key.parse(key)) for name in names for key in expand(name, robot)]
-    shares = {}
-    for name, share in within.items() if isinstance(within, Mapping) else [("", within)]:
-        shares |= dict.fromkeys(expand(name, robot), share)
+    shares = dict(within) if isinstance(within, Mapping) else {"": within}
     for name in shares:
         if name and name not in fitted and name.partition(".")[0] not in method.nuisances:
             raise InputError(
