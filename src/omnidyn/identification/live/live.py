@@ -254,7 +254,7 @@ def _shares(within: object, fitted: list[str], method: OutputError) -> dict[str,
     fitted: it would be waited for in vain, or not at all."""
     shares = dict(within) if isinstance(within, Mapping) else {"": within}
     for name in shares:
-        if name and name not in fitted and name.partition(".")[0] not in method.nuisances:
+        if name and name not in fitted and name.partition(".")[0] not in (method.nuisances or (LATENCY, PUSH)):
             raise InputError(
                 "not fitted", got=name, expected=", ".join(fitted), remedy="free it, or leave it out of `within`",
                 where="within",
