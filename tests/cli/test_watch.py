@@ -114,6 +114,48 @@ def test_what_it_does_not_take(call, here, arguments, words):
     assert words in err
 
 
+def test_numbers_are_shown_though_a_file_of_another_robot_takes_the_place(call, here, lines, monkeypatch):
+    (here / "log.csv").write_text("".join(lines[:700]))
+    other = "t_s,u1_V,u2_V,u3_V,u4_V,vx_m_s,vy_m_s,omega_rad_s\n"
+    other += "".join(f"{0.01 * k:.2f},1,1.1,{k % 9},1.3,0.1,0.2,0.3\n" for k in range(300))
+    monkeypatch.setattr("omnidyn.cli.watch.time.sleep", lambda _: (here / "log.csv").write_text(other))
+    code, out, err = call("watch", "log.csv", "--robot", "axebot", "--idle", "5")
+    assert code == 3
+    assert "more wheels than the robot; got 4 wheels; expected 3" in err
+    assert "95 % interval" in out
+
+
+def test_times_that_are_too_short_are_seen(call, here, lines):
+    """Times a thousand times too short: 2001 rows came, in no time."""
+    head, *rows = lines
+    short = [f"{float(at) / 1000.0:.6f},{rest}" for at, rest in (row.split(",", 1) for row in rows)]
+    (here / "log.csv").write_text(head + "".join(short))
+    code, out, _ = call("watch", "log.csv", "--robot", "axebot", "--idle", "0.2")
+    assert code == 4
+    assert "after 0 s and 2001 rows" in out
+
+
+def test_a_wrong_key_is_refused_before_the_drive(call, here):
+    (here / "log.csv").write_text("t_s\n")
+    code, out, err = call("watch", "log.csv", "--robot", "axebot", "--free", "friction.axis", "--idle", "0.2")
+    assert (code, out) == (3, "")
+    assert "unknown key; got friction.axis" in err
+
+
+def test_standard_input_that_is_closed_or_empty(call, here, monkeypatch):
+    monkeypatch.setattr("sys.stdin", None)
+    code, _, err = call("watch", "-", "--robot", "axebot")
+    assert code == 3
+    assert "standard input is closed; expected rows of text; pipe them in" in err
+    (here / "rows").write_text("")
+    with (here / "rows").open() as stream:
+        monkeypatch.setattr("sys.stdin", stream)
+        code, out, _ = call("watch", "-", "--robot", "axebot")
+    assert code == 4
+    assert "after 0 s and 0 rows" in out
+    assert "number  key" not in out
+
+
 def test_a_robot_with_a_speed_loop_is_refused(call, here):
     (here / "log.csv").write_text("t_s\n")
     code, _, err = call("watch", "log.csv", "--robot", "robotino")

@@ -40,6 +40,26 @@ def test_half_lines_headers_and_words_are_left_out_and_counted(table):
     assert table.end() == []
 
 
+def test_what_stands_above_the_header_belongs_to_all_rows(table):
+    rows = [*map(row, range(300))]
+    for above in ("# made by a logger\n", "My robot\n\n"):
+        table.begin_anew()
+        runs = table.feed(above + HEAD + "".join(rows[:150])) + table.feed("".join(rows[150:]))
+        assert len(joined(runs)) == 300
+    assert table.bad_rows == 0
+
+
+def test_rows_without_numbers_binary_ones_and_one_that_does_not_end_are_survived(table):
+    rows = [*map(row, range(300))]
+    runs = table.feed("\0\n" + HEAD + "".join(rows[:150]))  # a packet of somebody else
+    runs += table.feed("".join(f"{0.01 * k:.2f}{',nan' * 6}\n" for k in range(150, 170)))  # a sensor hub is out
+    runs += table.feed("".join(rows[170:180]) + "\0" * 50 + "\n" + "".join(rows[180:200]))  # power was lost
+    runs += table.feed("1," * (1 << 20)) + table.feed("1\n" + rows[200])
+    runs += table.feed(rows[203] + rows[202] + rows[201])  # times in disorder
+    assert len(joined(runs)) == 181
+    assert table.bad_rows == 26
+
+
 def test_a_clock_that_begins_anew_begins_a_run_of_its_own(table):
     runs = table.feed(HEAD + "".join(map(row, range(150))))
     live = omnidyn.Live(table.robot)

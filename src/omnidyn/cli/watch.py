@@ -23,6 +23,7 @@ from omnidyn.files import format_of, open_regular
 
 if TYPE_CHECKING:
     from omnidyn.identification.live.status import LiveStatus
+    from omnidyn.logs.growing import GrowingTable
     from omnidyn.run import Run
 
 STDIN, UDP = "-", "udp:"
@@ -62,7 +63,7 @@ def watch(
     before = omnidyn.load_robot(reference) if reference else None
     method = OutputError(free=tuple(free), nuisances=("latency", "push")) if free else None
     live = Live(given, method, within=within / 100.0, reference=before)
-    table = GrowingTable(source, given, flags.options())
+    table, told_bad = GrowingTable(source, given, flags.options()), 0
 
     def is_over(runs: list[Run]) -> bool:
         """Take runs, and tell each second of them; whether that is enough, and all that was asked for."""
@@ -82,19 +83,31 @@ def watch(
             is_first, runs = table.columns is None, table.feed(text)
             if is_first and table.columns is not None:
                 maps.show(source, table.columns)
+            if table.bad_rows > 2 * told_bad:
+                told_bad = _tell_bad(table)
             if is_over(runs):
                 break
         else:
             is_over(table.end())
     except KeyboardInterrupt:
         say("omnidyn: ended")
-    if table.bad_rows:
-        say(f"omnidyn: warning: {table.bad_rows} lines held no row and were left out")
+    except InputError:  # what was learnt before it is shown
+        if live.status.numbers and not json:
+            tell(live.status.document(), False, provenance([robot_input(robot)]))
+        raise
+    if table.bad_rows > told_bad:
+        _tell_bad(table)
     status = live.status
     if not json:
         tell(status.document(), False, provenance([robot_input(robot)]))
     if not status.is_enough:
         end_failed(status.verdict)
+
+
+def _tell_bad(table: GrowingTable) -> int:
+    """How many lines could not be used so far."""
+    say(f"omnidyn: warning: lines that hold no usable row, left out so far: {table.bad_rows}")
+    return table.bad_rows
 
 
 def _tell(status: LiveStatus, json: bool) -> None:
@@ -103,8 +116,8 @@ def _tell(status: LiveStatus, json: bool) -> None:
         show_line(status.to_dict() | {"verdict": sentence(str(status.verdict))})
         return
     show(f"{status.seconds:6.0f} s  {sentence(str(status.verdict))}")
-    for change in status.changes:
-        show(f"{'':10s}{sentence(str(change))}")
+    for doubt in status.doubts:
+        show(f"{'':10s}{sentence(str(doubt))}")
 
 
 def _texts(source: str, idle: float) -> Iterator[str | None]:
@@ -125,6 +138,8 @@ def _bytes(source: str) -> Iterator[bytes | None]:
 
 
 def _of_stdin() -> Iterator[bytes]:
+    if sys.stdin is None:
+        raise InputError("standard input is closed", expected="rows of text", remedy="pipe them in", where=STDIN)
     number = sys.stdin.fileno()
     while data := os.read(number, MOST_BYTES):
         yield data

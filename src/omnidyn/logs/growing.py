@@ -1,11 +1,13 @@
 """A text file that is still being written: its rows as Runs, as they come.
 
-Only whole lines are taken. Which column is what is decided once, from the first rows; a line that holds no row (half
-written, another header) is left out and counted. A clock that begins anew begins a Run of its own.
+Only whole lines are taken. Which column is what is decided once, from the first rows; what stands above them belongs to
+all. Later a line that holds no row (half written, binary), and rows without numbers, are left out and counted. A clock
+that begins anew begins a Run of its own.
 """
 
 from __future__ import annotations
 
+import re
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -23,30 +25,34 @@ from omnidyn.run import Run
 
 FIRST_ROWS = 100  # from which columns are guessed
 MOST_BYTES = 1 << 20  # of a line that does not end
+BROKEN = "\0"  # in its place
+BINARY = re.compile(r"[\x00-\x08\x0e-\x1f]")  # what no line of text holds, such as zeros after a loss of power
 TURN = 2.0 * np.pi
 
 
 class GrowingTable:
     """Lines in, Runs out. source: its name. columns: which column is what, once that is known; bad_rows: lines that
-    held no row."""
+    held no row that can be used."""
 
     def __init__(self, source: str, robot: Robot | None = None, options: LogOptions | None = None) -> None:
         self.source, self.robot, self.options = source, robot, replace(options or LogOptions(), skip_bad_rows=True)
         self.columns: ColumnMap | None = None
         self.bad_rows = 0
-        self._rest, self._lines, self._head = "", list[str](), ""
+        self._rest, self._lines, self._head = "", list[str](), list[str]()
         self._clock, self._heading = Clock(), np.nan
 
     def feed(self, text: str) -> list[Run]:
         """Take more text; the rows that are whole by now. Raises InputError for what is no table, or is doubtful."""
         *lines, self._rest = (self._rest + text).replace("\r\n", "\n").split("\n")
-        if len(self._rest) > MOST_BYTES:
+        if len(self._rest) > MOST_BYTES and self.columns is None:
             raise InputError(
                 "a line does not end",
                 got=f"{len(self._rest)} characters",
                 expected="rows of text, such as CSV",
                 where=self.source,
             )
+        if len(self._rest) > MOST_BYTES:  # its end, some time, is no row either
+            self._rest = BROKEN
         self._lines += [line for line in lines if line.strip()]
         return self._read() if len(self._lines) > (FIRST_ROWS if self.columns is None else 0) else []
 
@@ -56,39 +62,50 @@ class GrowingTable:
 
     def begin_anew(self) -> None:
         """The file was written anew: its clock, and perhaps its columns."""
-        self.columns, self._head, self._rest, self._lines, self._clock = None, "", "", [], Clock()
+        self.columns, self._head, self._rest, self._lines, self._clock = None, [], "", [], Clock()
 
     def _read(self) -> list[Run]:
-        lines, self._lines = self._lines, []
-        if not self._head and self.options.header:
-            self._head, *lines = lines
-        lines = [line for line in lines if line != self._head]  # a logger that begins anew writes it once more
+        lines = self._without_head(self._lines)
+        text = [line for line in lines if not BINARY.search(line)]
+        if self.columns is not None or 2 * len(text) > len(lines):  # else the reader says that this is no text
+            self.bad_rows += len(lines) - len(text)
+            lines = text
+        self._lines, is_first = [], self.columns is None
         if not lines:
             return []
-        table = self._table(lines)
-        if table is None:
+        try:
+            table = self._table(lines)
+            if is_first:
+                first = int(table.lines[0]) - 1
+                self._head = lines[:first]
+                lines = self._without_head(lines[first:])
+            self.columns = self.columns or map_columns(table, self.robot, self.options)
+            log = log_from_table(table, self.columns, self.robot, self.options, self._clock)
+            runs = [part.to_run() for part in log.recordings() if len(part)]
+        except InputError:
+            if is_first:
+                raise
+            self.bad_rows += len(lines)
             return []
-        if self.columns is None:
-            self.columns = map_columns(table, self.robot, self.options)
         self.bad_rows += max(len(lines) - len(table), 0)
-        log = log_from_table(table, self.columns, self.robot, self.options, self._clock)
-        return [self._continued(part.to_run()) for part in log.recordings() if len(part)]
+        return [self._continued(run) for run in runs]
 
-    def _table(self, lines: list[str]) -> FileTable | None:
-        """The lines as a table, below the header; None where none of them is a row."""
+    def _without_head(self, lines: list[str]) -> list[str]:
+        """The lines without those of the head, which a logger that begins anew writes once more."""
+        return [line for line in lines if line not in self._head]
+
+    def _table(self, lines: list[str]) -> FileTable:
+        """The lines as a table, below the header. Raises InputError where none of them is a row."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, "rows.csv")
-            path.write_text("\n".join([self._head] * self.options.header + lines) + "\n", encoding="utf-8")
+            path.write_text("\n".join([*self._head, *lines]) + "\n", encoding="utf-8")
             try:
                 table = read_table(path, **self.options.of_tables)
             except InputError as error:
-                if self.columns is None:
-                    place = error.where.replace(str(path), self.source)
-                    raise InputError(
-                        error.what, got=error.got, expected=error.expected, remedy=error.remedy, where=place
-                    ) from None
-                self.bad_rows += len(lines)
-                return None
+                place = error.where.replace(str(path), self.source)
+                raise InputError(
+                    error.what, got=error.got, expected=error.expected, remedy=error.remedy, where=place
+                ) from None
         return replace(table, source=self.source)
 
     def _continued(self, run: Run) -> Run:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from omnidyn.document import all_of
+from omnidyn.document import all_of, short
 from omnidyn.model.keys import in_words
 from omnidyn.statement import Statement
 from omnidyn.telling.sentence import Sentence
@@ -13,9 +13,10 @@ LOOKS_LIKE = {"floor": "another floor", "payload": "another payload", "wear": "w
 def _not_yet(statement: Statement) -> str:
     """How many numbers are known, and which one is missing most."""
     numbers = statement.numbers
-    width = "unknown" if numbers["half"] is None else f"within {100.0 * numbers['half']:.2g} %"
+    half = numbers["half"]
+    width = "unknown" if half is None else "not within 100 %" if half > 1.0 else f"within {short(100.0 * half)} %"
     words = f"not yet: after {numbers['seconds']:.0f} s {numbers['known']} of {numbers['count']} numbers are known"
-    return f"{words}; {in_words(numbers['widest'])} is {width}, wanted {100.0 * numbers['within']:.2g} %"
+    return f"{words}; {in_words(numbers['widest'])} is {width}, wanted {short(100.0 * numbers['within'])} %"
 
 
 def _not_predicted(statement: Statement) -> str:
@@ -33,10 +34,21 @@ def _changed(statement: Statement) -> str:
     return f"this looks like {LOOKS_LIKE[statement.subject]}: {words} beside the fit before"
 
 
+def _misfit(statement: Statement) -> str:
+    """What the residuals follow."""
+    follows = all_of(statement.numbers["follows"])
+    return f"the model leaves something out (its errors follow {follows}): numbers and intervals may be wrong"
+
+
 SENTENCES = {
-    "live_waiting": Sentence("no numbers yet after {seconds:.0f} s: {why}"),
+    "live_waiting": Sentence("no numbers yet after {seconds:.0f} s and {rows} rows: {why}"),
     "live_not_yet": Sentence(_not_yet),
     "live_not_predicted": Sentence(_not_predicted, "drive on; where it stays so, fit the log with identify"),
+    "live_not_this_model": Sentence(
+        "not yet: the numbers are known, but the model leaves something out",
+        "fit the log with identify: it looks for what",
+    ),
+    "live_misfit": Sentence(_misfit, "fit the log with identify: it looks for what"),
     "live_enough": Sentence(
         "enough: after {at:.0f} s all numbers are known, and a stretch that was held out was predicted"
     ),

@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 
 import omnidyn
 from omnidyn.identification.live.rows import Rows, part
+from omnidyn.identification.live.status import LiveNumber, LiveStatus
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.model.keys import BOX
 from tests.support.axebot_logs import NOISE, TRUTH, coloured, noisy, voltages, with_friction
@@ -104,9 +105,50 @@ def test_numbers_that_do_not_predict_are_not_enough(exact):
     other = with_friction(ROBOT, [2.0 * value for value in TRUTH.values()])
     volts = voltages(np.random.default_rng(4), 10.0)
     first, second = noisy(exact, 1), noisy(omnidyn.simulate(other, volts, 0.01), 2)
-    live = fed(part(first, 0, 2000), omnidyn.Live(WRONG, within=0.01))
-    live.add(second.replace(t=second.t + 20.5))
-    assert live.status.held_out.missed
+    live = fed(part(first, 0, 2000), omnidyn.Live(WRONG, within=0.5))
+    assert live.status.is_enough
+    for status in live.answers(second.replace(t=second.t + 20.5)):
+        assert status.is_enough == (status.verdict.code == "live_enough")
+        assert not status.is_enough or not status.missing
+        if status.held_out.missed:
+            break
+    assert status.held_out.missed
+    assert status.enough_at is None
+    assert "not yet" in str(status.verdict)
+
+
+def test_a_model_that_leaves_something_out_is_said_and_never_enough():
+    """Friction along the direction of travel, as one disc, by Euler steps of 0.5 ms; the model has it along each axis.
+    All intervals are narrow, stretches are predicted within errors that remember, and Coulomb friction is 70 % off."""
+    volts = voltages(np.random.default_rng(100), 45.0)
+    mass, viscous, level = np.array([1.5, 1.5, 0.025]), np.array(list(TRUTH.values())[:3]), np.array([2.2, 1.5, 0.099])
+    azimuth = np.deg2rad([180.0, -60.0, 60.0])
+    wrench = np.stack([-np.sin(azimuth), np.cos(azimuth), np.full(3, 0.1)])
+    k, step, v, twist = 19.0 * 0.0059 / 0.035, 5e-4, np.zeros(3), [np.zeros(3)]
+    for u in volts:
+        for _ in range(20):
+            rim = v * np.array([1.0, 1.0, 0.1])
+            way = rim / max(np.sqrt(rim @ rim), 1e-3)
+            v = v + step * (wrench @ (k * (u - k * wrench.T @ v) / 1.69) - viscous * v - level * way) / mass
+        twist.append(v)
+    noise = 0.1 * NOISE * np.random.default_rng(1).normal(size=(len(twist), 3))
+    log = omnidyn.Run(t=np.arange(len(twist)) / 100.0, voltage=np.vstack([volts, volts[-1]]), twist=twist + noise)
+    live = omnidyn.Live(WRONG, within=0.2)
+    statuses = [status for first in range(0, len(log), 100) for status in live.answers(part(log, first, first + 100))]
+    assert any(not status.missing and status.held_out.predicted for status in statuses[6:])  # what was enough before
+    assert not any(status.is_enough for status in statuses)
+    assert "the model leaves something out (its errors follow" in " ".join(map(str, statuses[-1].statements()))
+    assert abs(statuses[-1].numbers[BOX[5]].value / TRUTH[BOX[5]] - 1.0) > 0.5
+
+
+def test_an_unknown_width_is_said_in_words_and_percents_have_no_exponent():
+    number = LiveNumber(0.0, 1.0, 0.0, 2.0, 0.1, False)
+    status = LiveStatus("robot", 9.0, 900, {"friction.axes.viscous[0]": number})
+    assert str(status.verdict).endswith("viscous friction forward is not within 100 %, wanted 10 %")
+    assert "e+" not in str(status)
+    late = LiveStatus("robot", 9.0, 900, {"friction.axes.viscous[0]": number}, enough_at=5.0)
+    assert not late.is_enough  # a number that is wide again
+    assert "interval" not in str(LiveStatus("robot", waiting="no rows"))
 
 
 def test_the_floor_that_changed_is_said():
@@ -130,7 +172,14 @@ def test_a_robot_at_rest_has_no_numbers_and_says_why():
     status = fed(run).status
     assert not status.numbers
     assert "never visibly moved" in status.waiting
-    assert "no numbers yet after 7 s" in str(status.verdict)
+    assert "no numbers yet after 8 s and 800 rows" in str(status.verdict)
+
+
+def test_what_a_dead_sensor_does_not_show_is_unknown_and_never_enough(log):
+    twist = log.twist * np.array([1.0, 0.0, 0.0])
+    status = fed(omnidyn.Run(t=log.t, voltage=log.voltage, twist=twist), omnidyn.Live(WRONG, within=0.5)).status
+    assert not status.is_enough
+    assert {BOX[1], BOX[2], BOX[4], BOX[5]} <= {*status.unknown} & {*status.missing}
 
 
 def test_gaps_restarts_and_missing_values_are_survived_and_said(log, live):
@@ -182,5 +231,13 @@ def test_what_cannot_be_used_is_refused():
         omnidyn.Live(ROBOT).add(omnidyn.Run(t=[0.0, 0.1], voltage=np.zeros((2, 4)), twist=np.zeros((2, 3))))
     with pytest.raises(omnidyn.OmnidynError, match="got -1; expected a share above 0"):
         omnidyn.Live(ROBOT, within=-1)
+    with pytest.raises(omnidyn.OmnidynError, match=r"within: not fitted; got body.mass_kg; expected friction.axes.v"):
+        omnidyn.Live(ROBOT, within={"body.mass_kg": 0.1})  # else nothing need be known, and all is enough
+    with pytest.raises(
+        omnidyn.OmnidynError, match="fit before is of another robot; got 4 wheels; expected 3, as axebot"
+    ):
+        omnidyn.Live(ROBOT, reference=omnidyn.load_robot("mecanum"))
+    with pytest.raises(omnidyn.OmnidynError, match="unknown key; got nonsense"):
+        omnidyn.Live(ROBOT, omnidyn.OutputError(free=("nonsense",)))
     with pytest.raises(omnidyn.OmnidynError, match=r"speed loop.*expected drive kind voltage or duty"):
         omnidyn.Live(omnidyn.load_robot("robotino"))

@@ -18,7 +18,7 @@ from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.prepare import free_by_default, guesses
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH
 from omnidyn.model.drive import SPEED
-from omnidyn.model.keys import expand
+from omnidyn.model.keys import Key, expand
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
@@ -26,6 +26,7 @@ RESISTANCE = "motor.resistance_ohm"
 EVERY = 1.0  # [s] of the log between two answers
 STRETCH = 5.0  # [s] whose rows are predicted before they count
 FIRST = 4.0  # [s] of the log before the first fit
+SURE = 10.0  # [s] of the log in a whole fit that may say that the model leaves something out
 GROWTH, SOONER = 2.0, 1.15  # times as much log at which all is fitted anew; where that seems to be needed
 MOVED = 0.2  # standard errors that a number of a long log may move before all rows are taken anew
 FIT_ROWS = 8_000  # rows of a whole fit: with so many, the noise is known
@@ -77,9 +78,18 @@ class Live:
                 remedy="log what reaches the motors, or fit the whole log with identify",
                 where="robot",
             )
+        if reference is not None and reference.wheels.count != robot.wheels.count:
+            raise InputError(
+                "the fit before is of another robot",
+                got=f"{reference.wheels.count} wheels",
+                expected=f"{robot.wheels.count}, as {robot.name} has",
+                remedy="give a fit of this robot",
+                where="reference",
+            )
         self.robot, self.reference = robot, reference
         self.method = method or _default_method(robot, reference is not None)
-        self._within = _shares(within)
+        self._fitted = _fitted(robot, self.method)
+        self._within = _shares(within, self._fitted, self.method)
         self._rows, self._model = Rows(), None
         self._start = self._answered = math.nan
         self._fitted_rows, self._fitted_at = 0, 0.0
@@ -138,6 +148,8 @@ class Live:
                 self._update(self._answered)
                 self._status = self._answer()
                 yield self._status
+        if self._model is None:
+            self._status = self._answer()
 
     def _update(self, now: float) -> None:
         if self._model is None:
@@ -150,16 +162,20 @@ class Live:
         if now - model.start < STRETCH:
             return
         self._held_out = model.judge(now)
-        if self._enough_at is None and self._was_reached and self._held_out.predicted and self._is_reached():
-            self._enough_at = now - self._start
+        seems_enough = self._was_reached and self._held_out.predicted and self._is_reached()
         model.close(now)
         age, is_small = now - self._start, self._rows.count <= FIT_ROWS
         has_grown = age >= GROWTH * (self._fitted_at - self._start) and self._fitted_rows < FIT_ROWS
-        if has_grown or (self._held_out.missed and age >= SOONER * (self._fitted_at - self._start)):
+        is_doubtful = bool(self._held_out.missed) or (seems_enough and self._enough_at is None)
+        if has_grown or (is_doubtful and age >= SOONER * (self._fitted_at - self._start)):
             self._fit(now)
         elif is_small or (model.moved > MOVED and age >= SOONER * (model.fitted_at - self._start)):
             model.linearise(self._rows, now)
         self._was_reached = self._is_reached()
+        if self._held_out.missed or self._model.misfit:
+            self._enough_at = None
+        elif self._enough_at is None and seems_enough and self._was_reached:
+            self._enough_at = age
         if self._rows.count > MOST_ROWS:
             self._model.freeze()
             self._rows.forget(self._model.start - STRETCH)
@@ -192,6 +208,12 @@ class Live:
         for name, value, is_unknown in zip(model.problem.names, model.values.tolist(), model.unknown, strict=True):
             within = self._within.get(name, self._within.get("", 0.0) if name in robot_names else 0.0)
             numbers[name] = LiveNumber(value, std[name], *ci95[name], within, bool(is_unknown))
+        for name in self._fitted:  # what the fit held, such as friction along an axis that never moved
+            if name not in numbers:
+                within = self._within.get(name, self._within.get("", 0.0))
+                numbers[name] = LiveNumber(
+                    float(Key.parse(name).get(self.robot)), math.inf, -math.inf, math.inf, within, True
+                )
         return numbers
 
     def _answer(self) -> LiveStatus:
@@ -208,6 +230,7 @@ class Live:
             numbers=self._numbers(),
             held_out=self._held_out,
             enough_at=self._enough_at,
+            misfit=self._model.misfit if self._fitted_at - self._start >= SURE else (),
             changes=changed,
             waiting="",
         )
@@ -220,9 +243,22 @@ def _default_method(robot: Robot, is_compared: bool) -> OutputError:
     return OutputError(free=tuple(dict.fromkeys(keys)), nuisances=(LATENCY, PUSH))
 
 
-def _shares(within: object) -> dict[str, float]:
-    """Key -> share; "" for all numbers of the robot. Raises InputError for what is no share."""
+def _fitted(robot: Robot, method: OutputError) -> list[str]:
+    """The numbers of the robot that are asked for. Raises InputError for a name that is none."""
+    names = (*free_by_default(robot), *guesses(robot)) if method.free is None else method.free
+    return [str(Key.parse(key)) for name in names for key in expand(name, robot)]
+
+
+def _shares(within: object, fitted: list[str], method: OutputError) -> dict[str, float]:
+    """Key -> share; "" for all numbers of the robot. Raises InputError for what is no share, and for a key that is not
+    fitted: it would be waited for in vain, or not at all."""
     shares = dict(within) if isinstance(within, Mapping) else {"": within}
+    for name in shares:
+        if name and name not in fitted and name.partition(".")[0] not in (method.nuisances or (LATENCY, PUSH)):
+            raise InputError(
+                "not fitted", got=name, expected=", ".join(fitted), remedy="free it, or leave it out of `within`",
+                where="within",
+            )  # fmt: skip
     for name, share in shares.items():
         if not is_number(share) or not 0.0 < share < math.inf:  # type: ignore[operator]
             raise InputError(

@@ -29,6 +29,7 @@ from omnidyn.identification.output_error.problem.problem import Piece, Point, Pr
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
 from omnidyn.identification.output_error.trust.uncertainty import WHITE, Trust, trust
+from omnidyn.identification.structure.diagnosis import followed_themes
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
@@ -67,6 +68,7 @@ class PredictedStretch:
 class LiveModel:
     """What the rows so far say. values (P,): of the numbers, uncertainty: of them; both as of the last `settle`.
 
+    misfit: what the residuals of the whole fit follow, nothing where the model leaves nothing out.
     fitted_at [s]: of the last row in the whole fit. start [s]: of the stretch that is not closed yet.
     """
 
@@ -76,6 +78,7 @@ class LiveModel:
         weighed = fit.weighed(fit.solve())
         solver, state = weighed.solution.solver, weighed.solution.state
         self.group, self.question = fit.groups[0], question
+        self.misfit = followed_themes(weighed.solution)
         self.differences = None if question.tick_rad == 0.0 else differences([run])
         self.problem: Problem = solver.problem
         self.counted = solver.tick > 0.0

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from omnidyn.document import Document, Points, Table, interval_cell, plain
+from omnidyn.document import Document, Points, Table, interval_cell, plain, short
 from omnidyn.identification.live.model import PredictedStretch
 from omnidyn.model.keys import in_words
 from omnidyn.shown import Displayable
@@ -45,8 +45,9 @@ class LiveStatus(Displayable):
 
     robot: its name. seconds [s], rows: how much came. numbers: key -> the number now. held_out: the last stretch that
     was predicted before it counted. enough_at [s]: when all numbers that must be were known and such a stretch was
-    predicted, None before. restarts: of the clock of the log. gap [s]: the longest between two rows. waiting: why there
-    are no numbers yet. changes: what is no longer as in the fit before.
+    predicted, None before, and again once a stretch is not. misfit: what the residuals of the last whole fit follow,
+    nothing where the model leaves nothing out. restarts: of the clock of the log. gap [s]: the longest between two
+    rows. waiting: why there are no numbers yet. changes: what is no longer as in the fit before.
     """
 
     robot: str
@@ -55,6 +56,7 @@ class LiveStatus(Displayable):
     numbers: Mapping[str, LiveNumber] = field(default_factory=dict)
     held_out: PredictedStretch | None = None
     enough_at: float | None = None
+    misfit: tuple[str, ...] = ()
     restarts: int = 0
     gap: float = 0.0
     waiting: str = ""
@@ -63,7 +65,7 @@ class LiveStatus(Displayable):
     @property
     def is_enough(self) -> bool:
         """Whether the drive may end."""
-        return self.enough_at is not None
+        return self.enough_at is not None and not self.missing
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -81,22 +83,30 @@ class LiveStatus(Displayable):
         """Whether it is enough, and what is missing."""
         numbers: dict[str, Any] = {"seconds": self.seconds}
         if not self.numbers:
-            return Statement("live_waiting", NOTE, self.robot, numbers | {"why": self.waiting})
-        if self.enough_at is not None:
+            return Statement("live_waiting", NOTE, self.robot, numbers | {"rows": self.rows, "why": self.waiting})
+        if self.is_enough:
             return Statement("live_enough", NOTE, self.robot, numbers | {"at": self.enough_at})
         wanted = sum(number.within > 0.0 for number in self.numbers.values())
         if self.missing:
             widest = self.missing[0]
             number = self.numbers[widest]
             numbers |= {"count": wanted, "known": wanted - len(self.missing), "widest": widest}
-            numbers |= {"half": None if math.isinf(number.half) else number.half, "within": number.within}
+            numbers |= {"half": None if number.is_unknown else number.half, "within": number.within}
             return Statement("live_not_yet", NOTE, self.robot, numbers)
+        if self.misfit:
+            return Statement("live_not_this_model", WARNING, self.robot, numbers)
         missed = () if self.held_out is None else self.held_out.missed
         return Statement("live_not_predicted", WARNING if missed else NOTE, self.robot, numbers | {"missed": missed})
 
+    @property
+    def doubts(self) -> tuple[Statement, ...]:
+        """What is no longer as it was, and what the model leaves out."""
+        misfit = [Statement("live_misfit", WARNING, numbers={"follows": self.misfit[:2]})] if self.misfit else []
+        return (*self.changes, *misfit)
+
     def statements(self) -> list[Statement]:
-        """What happened on the way."""
-        said = [*self.changes]
+        """What is wrong with the numbers, and what happened on the way."""
+        said = [*self.doubts]
         if self.restarts:
             said.append(Statement("live_restarts", WARNING, numbers={"restarts": self.restarts}))
         if self.gap:
@@ -111,16 +121,16 @@ class LiveStatus(Displayable):
                 name,
                 "-" if number.is_unknown else f"{number.value:.4g}",
                 "unknown" if number.is_unknown else interval_cell((number.low, number.high)),
-                "-" if math.isinf(number.half) or not number.within else f"{100.0 * number.half:.2g}",
+                "-" if number.half > 1.0 or not number.within else short(100.0 * number.half),
                 "" if not number.within else "yes" if number.is_reached else "no",
             )
             for name, number in self.numbers.items()
         ]
-        parts = [
-            Table(("number", "key", "now", "95 % interval", "+- %", "enough"), rows, "<<><><", name="numbers"),
-            Points(self.statements()),
-        ]
-        return Document(parts, as_verdict(self.verdict) | self.to_dict(), verdict=self.verdict)
+        table = Table(("number", "key", "now", "95 % interval", "+- %", "enough"), rows, "<<><><", name="numbers")
+        parts = [table] if rows else []
+        return Document(
+            [*parts, Points(self.statements())], as_verdict(self.verdict) | self.to_dict(), verdict=self.verdict
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -140,6 +150,7 @@ class LiveStatus(Displayable):
                 "held_out": None
                 if held is None
                 else {"start_s": held.start, "end_s": held.end, "predicted": held.predicted, "ratio": dict(held.ratio)},
+                "misfit": list(self.misfit),
                 "restarts": self.restarts,
                 "changes": [change.to_dict() for change in self.changes],
             }

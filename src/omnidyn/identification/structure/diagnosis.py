@@ -11,7 +11,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import small_matrices
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
-from omnidyn.identification.output_error.linear.driven_motion import motions
+from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion, motions
 from omnidyn.identification.output_error.linear.rounded_inputs import effects, with_rounding
 from omnidyn.identification.output_error.linear.rows import FitRows, Linear
 from omnidyn.identification.output_error.linear.workbench import Workbench
@@ -50,6 +50,14 @@ class Examined:
     rows: int
 
 
+@small_matrices()
+def followed_themes(solution: Solution) -> tuple[str, ...]:
+    """What the residuals of a fit follow, first what explains most; nothing where the model leaves nothing out. A part
+    of the diagnosis, in a fraction of its time."""
+    _, piece_motions, rows = _shown(solution)
+    return tuple(found.theme for found in misfit(rows, piece_motions).found_themes)
+
+
 def diagnose(solution: Solution) -> Diagnosis:
     """What is wrong with a fit at its best point."""
     return examine(solution).diagnosis
@@ -64,16 +72,10 @@ def examine(solution: Solution) -> Examined:
     of 35 to 60 that have nothing in common, by draws from their scalar products.
     """
     solver, point = solution.solver, solution.state.point
-    full_problem = with_levels(solver.problem, point, levels_of(solution))
-    decimated = Decimated.of(full_problem)
-    problem = bounded(decimated.problem, SHOWN_COLUMNS, effects(decimated.problem))
-    engine = solver.engine.on(decimated.all_rows(problem))
-    parts = decimated.kept(engine.residuals(point))
-    piece_motions = motions(problem, point)
-    rows = with_rounding(FitRows.of(problem, point, as_counted(solution, problem, parts)), piece_motions)
-    misfit_result = misfit(rows, piece_motions)
+    parts, piece_motions, rows = _shown(solution)
+    problem, misfit_result = rows.problem, misfit(rows, piece_motions)
     stable = stability(misfit_result.linear)
-    bench = Workbench(problem, point, type(engine), piece_motions, stable.likely)
+    bench = Workbench(problem, point, type(solver.engine), piece_motions, stable.likely)
     causes = [*candidates(bench), *unoffered(bench)]
     candidate_trials = _tried(bench, [candidate for candidate in causes if not candidate.is_late])
     ranking = remedies(misfit_result.linear, candidate_trials, misfit_result.columns_by_piece)
@@ -112,6 +114,17 @@ def examine(solution: Solution) -> Examined:
     )
     diagnosis = Diagnosis(lack, rests_on(misfit_result.linear.plain, bench), stable)
     return Examined(diagnosis, memory, len(candidate_trials), count)
+
+
+def _shown(solution: Solution) -> tuple[list[Parts], Sequence[DrivenMotion], FitRows]:
+    """Residuals of a fit at its best point, the motion beside them, and both as rows that are not too many."""
+    solver, point = solution.solver, solution.state.point
+    decimated = Decimated.of(with_levels(solver.problem, point, levels_of(solution)))
+    problem = bounded(decimated.problem, SHOWN_COLUMNS, effects(decimated.problem))
+    parts = decimated.kept(solver.engine.on(decimated.all_rows(problem)).residuals(point))
+    piece_motions = motions(problem, point)
+    rows = with_rounding(FitRows.of(problem, point, as_counted(solution, problem, parts)), piece_motions)
+    return parts, piece_motions, rows
 
 
 def _tried(bench: Workbench, causes: Sequence[Candidate]) -> list[tuple[Candidate, list[Trial]]]:
