@@ -10,7 +10,17 @@ from typing import Any
 ROUNDS = 7  # what else a machine does only adds: the least of so many counts
 FACTOR = 4  # between two sizes
 NUMBERS = itertools.count()
-LINEAR = 8.0  # a linear call takes 4 times as long, a quadratic one 16 times
+
+
+def linear(factor: int) -> float:
+    """Halfway, as a power, between what a linear call takes more and what a quadratic one does: 4, 8 and 16 times.
+
+    A large factor sets the two further apart, for calls whose memory outgrows what a processor keeps near.
+    """
+    return factor**1.5
+
+
+LINEAR = linear(FACTOR)
 
 
 def spent(call: Callable[[], Any]) -> float:
