@@ -8,6 +8,7 @@
     python3 dev.py docs               the documentation, into docs/_build/html; says where
     python3 dev.py setup [core]       only make .venv, with everything or with what `demo` needs
     python3 dev.py lock [--upgrade]   resolve the two lock files again
+    python3 dev.py release            build twice, compare, look inside, try the wheel; refuses a tree with changes
 
 The first call makes .venv from a hash-locked file; a later call finds it complete and starts at once.
 Nothing is installed anywhere else.
@@ -374,6 +375,17 @@ def lock(arguments, env):
     return 0
 
 
+def release(arguments, env):
+    """Needs no .venv: it makes the environments in which it builds and tries."""
+    sys.path.insert(0, str(ROOT))
+    import release as made
+
+    return made.main(arguments, env)
+
+
+OTHERS = {"setup": setup, "lock": lock, "release": release}
+
+
 def main(arguments):
     name, rest = (arguments or ["help"])[0], arguments[1:]
     env = clean_env(os.environ)
@@ -382,9 +394,9 @@ def main(arguments):
         return 0 if arguments else 2
     if name in COMMANDS:
         return run(name, rest, env)
-    if name in ("setup", "lock"):
-        return {"setup": setup, "lock": lock}[name](rest, env)
-    say("no command {}; there are {}, setup, lock".format(name, ", ".join(COMMANDS)))
+    if name in OTHERS:
+        return OTHERS[name](rest, env)
+    say("no command {}; there are {}, {}".format(name, ", ".join(COMMANDS), ", ".join(OTHERS)))
     return 2
 
 

@@ -1,6 +1,7 @@
 """Files that are written: what is refused, what stays of the file that was there."""
 
 import contextlib
+import errno
 import os
 import stat
 import tracemalloc
@@ -8,7 +9,7 @@ import tracemalloc
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.files import check_output, keep_apart, parse_toml, write_atomic
+from omnidyn.files import check_output, keep_apart, open_atomic, parse_toml, write_atomic
 from tests.support.growth import LINEAR, growth
 
 posix = pytest.mark.skipif(os.name != "posix", reason="modes, links and pipes of POSIX")
@@ -114,3 +115,27 @@ def test_the_search_for_deep_keys_takes_no_time():
 def test_what_stands_in_text_and_numbers_is_no_key():
     words = ".".join("abcdefghijklmnopqrstuvwxyz")
     assert parse_toml(f'x = "{words}"\ny = 1.5  # {words}', "") == {"x": words, "y": 1.5}
+
+
+@pytest.mark.parametrize("where", ["fsync", "replace", "write"])
+def test_where_writing_fails_the_old_file_stays(tmp_path, monkeypatch, where):
+    """A disk that is full at any of the three moments; nothing is left beside the old file either."""
+    path = tmp_path / "fit.toml"
+    path.write_text("old")
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def replaced():
+        with open_atomic(path, True) as stream:
+            stream.write(b"new")
+            if where == "write":
+                full()
+
+    with monkeypatch.context() as patch:
+        if where != "write":
+            patch.setattr(os, where, full)
+        with pytest.raises(InputError, match="cannot write it; got No space left"):
+            replaced()
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["fit.toml"]

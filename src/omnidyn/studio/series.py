@@ -62,7 +62,8 @@ class Series:
     def __init__(self, folder: Path) -> None:
         self.meta = json.loads((folder / META).read_text("utf-8"))
         names = ("t", "values", "least", "largest")
-        self._t, self._values, self._least, self._largest = (np.load(folder / f"{n}.npy", mmap_mode="r") for n in names)
+        arrays = (np.load(folder / f"{name}.npy", mmap_mode="r", allow_pickle=False) for name in names)
+        self._t, self._values, self._least, self._largest = arrays
 
     def frame(self, begin: float, end: float, width: int) -> bytes:
         """What a picture of a stretch of time shows, as bytes: a head in JSON, then float32.
