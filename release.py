@@ -126,6 +126,13 @@ def lacks(names, wanted):
     return [f"no {name}" for name in wanted if name not in names] + [f"has {name}" for name in unwanted]
 
 
+def found_pythons():
+    """Those of PYTHONS that are installed and start: a shim may be there without the Python behind it."""
+    here = [found for each in PYTHONS if (found := shutil.which(each))]
+    works = [each for each in here if not subprocess.run([each, "-c", ""], capture_output=True).returncode]
+    return works or [sys.executable]
+
+
 def tried(wheel, folder, env, python):
     """Install the wheel, with the locked versions of what it needs, and use it from a folder that is not the tree."""
     inside = environment(folder / "env", env, python)
@@ -166,8 +173,7 @@ def main(arguments, env):
                 refuse(f"{file}: {', '.join(missing)}")
             print(f"{file}: {len(content)} bytes, {len(names)} files, sha256 {hashlib.sha256(content).hexdigest()}")
         (wheel,) = out.glob("*.whl")
-        pythons = [found for each in PYTHONS if (found := shutil.which(each))] or [sys.executable]
-        for k, each in enumerate(pythons):
+        for k, each in enumerate(found_pythons()):
             (work / f"trial{k}").mkdir()
             tried(wheel, work / f"trial{k}", env, each)
     say("built twice with equal hashes, looked into and tried; both files are in dist/")

@@ -230,7 +230,27 @@ def filled(page: str) -> str:
     def made(match: re.Match[str]) -> str:
         return f"{match.group(1)}{as_markdown(match.group(2))}{match.group(3)}"
 
-    return re.sub(r"(<!-- keys of ([a-z.]+) -->\n).*?(<!-- end -->)", made, page, flags=re.DOTALL)
+    page = re.sub(r"(<!-- keys of ([a-z.]+) -->\n).*?(<!-- end -->)", made, page, flags=re.DOTALL)
+    index = rf"\g<1>{index_of(page)}\g<2>"
+    return re.sub(r"(<!-- index -->\n).*?(<!-- end of index -->)", index, page, flags=re.DOTALL)
+
+
+def index_of(page: str) -> str:
+    """The sections of the page, each with the keys that its table explains."""
+    lines = ["| section | keys |", "| --- | --- |"]
+    for title, body in re.findall(r"^###? (.+?)\n(.*?)(?=^###? |\Z)", page, flags=re.DOTALL | re.MULTILINE):
+        keys = [f"`{key.key}`" for table in re.findall(r"<!-- keys of ([a-z.]+) -->", body) for key in keys_in(table)]
+        lines.append(f"| [{title.replace('[', '').replace(']', '')}](#{anchor(title)}) | {', '.join(keys)} |")
+    return "\n".join(lines) + "\n"
+
+
+def keys_in(table: str) -> list[Key]:
+    return [key for key in all_keys() if key.table == table]
+
+
+def anchor(title: str) -> str:
+    """What a link to a heading is called, on the page and where the repository is browsed."""
+    return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
 if __name__ == "__main__":

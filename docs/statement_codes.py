@@ -10,10 +10,22 @@ PAGE = Path(__file__).with_name("statements.md")
 
 
 def filled(page: str) -> str:
-    """The page with the table of each room behind its mark."""
-    return re.sub(
+    """The page with the table of each room behind its mark, and an index of its sections."""
+    page = re.sub(
         r"(<!-- codes of (\w+) -->\n).*?(?=\n## |\Z)", lambda mark: mark[1] + table(mark[2]), page, flags=re.DOTALL
     )
+    index = rf"\g<1>{index_of(page)}\g<2>"
+    return re.sub(r"(<!-- index -->\n).*?(<!-- end of index -->)", index, page, flags=re.DOTALL)
+
+
+def index_of(page: str) -> str:
+    """The sections of the page, with how many codes each has."""
+    lines = ["| section | codes |", "| --- | --- |"]
+    for title, body in re.findall(r"^## (.+?)\n(.*?)(?=^## |\Z)", page, flags=re.DOTALL | re.MULTILINE):
+        codes = re.findall(r"^\| `(\w+)` \|", body, flags=re.MULTILINE)
+        anchor = re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
+        lines.append(f"| [{title}](#{anchor}) | {len(codes)} |")
+    return "\n".join(lines) + "\n"
 
 
 def table(room: str) -> str:
