@@ -34,10 +34,10 @@ def twists(robot, volts, free_base=True):
 
 @pytest.mark.parametrize("volts", [[0, 2, -2], [0, 4, -4], [-3, 1.5, 1.5], [-5, 2.5, 2.5], [1.5, 1.5, 1.5]])
 def test_on_the_runs_of_the_paper_it_is_near(volts):
-    """To 1e-2 m/s and 1.5e-2 rad/s at steps of 1 ms: it pitches as it speeds up."""
+    """To 1.2e-2 m/s and 2.5e-2 rad/s at steps of 1 ms: it pitches as it speeds up, and its feet rub on along the floor."""
     program = np.repeat([volts, np.zeros(3), np.negative(volts)], [800, 400, 400], axis=0)
     run = omnidyn.simulate(ROBOT, program, 1e-3)
-    assert (np.abs(twists(ROBOT, program) - run.twist[1:]).max(axis=0) < [1e-2, 1e-2, 1.5e-2]).all()
+    assert (np.abs(twists(ROBOT, program) - run.twist[:-1]).max(axis=0) < [1.2e-2, 1.2e-2, 2.5e-2]).all()
 
 
 @pytest.mark.parametrize("robot", OTHERS, ids=lambda robot: robot.name)
@@ -95,7 +95,7 @@ def test_it_rests_within_its_dead_zone_and_leaves_it_outside(pattern):
         volts = times * breakaway_voltage(ROBOT, pattern) * np.array(pattern)
         seen = twists(ROBOT, np.tile(volts, (1000, 1)))
         moved.append(np.abs(seen[200:].mean(axis=0)).max())
-    assert moved[0] < 2e-4
+    assert moved[0] < 1e-4  # m/s or rad/s
     assert moved[1] > 1e-2
 
 

@@ -23,6 +23,7 @@ SOLVER = "0.002 1", "0.9999 0.9999 0.001 0.5 2"
 IMPRATIO = 1e4
 PRESSURE = 100.0  # of a foot, times its friction: with coefficients near 1 sliding would lift it
 NO_FRICTION = 1e-5  # MuJoCo's least coefficient
+LITTLE = 0.01  # the same of a foot that turns: with less it creeps, 0.03 rad/s at half of breakaway
 ROUNDING = 1e-12
 SHARE = 1e-4  # of mass and inertia that each foot has: what moves up and down must have some
 TOUCHING = 1e-8  # [m] from which on a foot counts as touching: rounding must not lift it
@@ -84,10 +85,14 @@ def foot_lines(robot: Robot, tall: float, k: int, foot: Foot) -> list[str]:
 
 def contacts(feet: list[Foot]) -> list[str]:
     """What each foot and the floor rub by: the first coefficient is that along the axis of the capsule."""
-    return [
-        f'    <pair geom1="floor" geom2="foot{k + 1}" condim="{4 if foot.turning else 3}" margin="{TOUCHING:g}" gap="0" '
-        f'friction="{several(*(max(level / foot.press, NO_FRICTION) for level in (foot.level, foot.across)))} '
-        f'{number(foot.turning / foot.press) if foot.turning else "0.005"} 0.0001 0.0001" '
-        f'solref="{SOLVER[0]}" solimp="{SOLVER[1]}"/>'
-        for k, foot in enumerate(feet)
-    ]
+    return [_contact(k + 1, foot) for k, foot in enumerate(feet)]
+
+
+def _contact(k: int, foot: Foot) -> str:
+    least = LITTLE if foot.turning else NO_FRICTION
+    sliding = several(*(max(level / foot.press, least) for level in (foot.level, foot.across)))
+    turning = number(foot.turning / foot.press) if foot.turning else "0.005"
+    return (
+        f'    <pair geom1="floor" geom2="foot{k}" condim="{4 if foot.turning else 3}" margin="{TOUCHING:g}" gap="0" '
+        f'friction="{sliding} {turning} 0.0001 0.0001" solref="{SOLVER[0]}" solimp="{SOLVER[1]}"/>'
+    )

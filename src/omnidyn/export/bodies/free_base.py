@@ -2,7 +2,7 @@
 
 Wheels are cylinders without friction: they bear the robot. Half of its weight stands on feet (feet.py), which carry the
 dry friction, so that it is what the robot file says and does not go with what the wheels bear: those of x and y as in
-the plane, and one for yaw, whose contact has a torsional coefficient. A foot hangs no lower than REACH below the wheels:
+the plane, and one for yaw, whose contact has a torsional coefficient, and a hundredth of its press along the floor. A foot hangs no lower than REACH below the wheels:
 in the air there is no friction, and a robot that tips lifts it off the floor. Viscous friction, which a free joint takes
 alike for all of its axes only, is that of actuators without a command. What spins is a mass without weight.
 """
@@ -22,7 +22,7 @@ from omnidyn.model.sliding import coulomb_along
 
 GRAVITY = 9.81  # [m/s^2] MuJoCo's own
 WEIGHT = 0.5  # share of the weight that stands on feet
-SHARE = 0.01  # of mass and inertia that each foot has: a spring throws what is lighter
+SHARE = 0.01  # of mass and inertia that each foot has: a spring throws what is lighter, and friction goes with it
 REACH = 0.02  # of the radius of a wheel: how far below it a foot hangs in the air
 SETTLING = 0.005  # [s] in which a foot comes to rest
 # In place of what features.py says of the model that slides in the plane.
