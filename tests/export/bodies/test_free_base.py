@@ -42,12 +42,12 @@ def test_on_the_runs_of_the_paper_it_is_near(volts):
 
 @pytest.mark.parametrize("robot", OTHERS, ids=lambda robot: robot.name)
 def test_robots_drive_as_they_do_in_the_plane(robot):
-    """Of a drive with a speed loop too, under the volts that it would send."""
+    """To 5 %: friction of more than half of the weight lifts its foot a little."""
     direction = np.linalg.pinv(robot.wheels.wrench_matrix) @ [1.0, 0.0, 0.0]
     volts = 0.5 * np.max(robot.motor.voltage_limit) * direction / np.abs(direction).max()
     free, plane = (twists(robot, np.tile(volts, (1000, 1)), free_base) for free_base in (True, False))
     assert plane[-1, 0] > 0.02  # forward
-    np.testing.assert_allclose(free[-1, 0], plane[-1, 0], rtol=0.03)
+    np.testing.assert_allclose(free[-1, 0], plane[-1, 0], rtol=0.05)
     assert np.abs(free[-1, 1:]).max() < 0.05 * plane[-1, 0]
 
 
