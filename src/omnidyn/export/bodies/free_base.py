@@ -1,10 +1,11 @@
-"""A free base for the MuJoCo model: it falls, lands on its wheels and tips, its motors and its friction as in the plane.
+"""A free base for the MuJoCo model: it falls, lands on its wheels and tips; motors and friction are as in the plane.
 
 Wheels are cylinders without friction: they bear the robot. Half of its weight stands on feet (feet.py), which carry the
 dry friction, so that it is what the robot file says and does not go with what the wheels bear: those of x and y as in
-the plane, and one for yaw, whose contact has a torsional coefficient, and a hundredth of its press along the floor. A foot hangs no lower than REACH below the wheels:
-in the air there is no friction, and a robot that tips lifts it off the floor. Viscous friction, which a free joint takes
-alike for all of its axes only, is that of actuators without a command. What spins is a mass without weight.
+the plane, and one for yaw, whose contact has a torsional coefficient, and a hundredth of its press along the floor. A
+foot hangs no lower than REACH below the wheels: in the air there is no friction, and a robot that tips lifts it off the
+floor. Viscous friction, which a free joint takes alike for all of its axes only, is that of actuators without a
+command. What spins is a mass without weight.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ NOTES = (
     "and gyro are in the frame of the body",
     "half of the weight stands on feet that carry the dry friction, on the plane `floor` only: it does not grow with a "
     "load, and is the same on any ground; a robot that tips begins to at half of the moment",
-    "motors push the body in the air, too: nothing rolls; wheels are all that touches other bodies: add geoms of the hull",
+    "motors push the body in the air, too: nothing rolls; wheels are all that touches other bodies: add geoms of it",
 )
 
 
@@ -88,7 +89,7 @@ def free_feet(robot: Robot) -> list[Foot]:
 def drags(robot: Robot) -> list[str]:
     """Viscous friction of the body, as forces at the floor along its axes."""
     along = robot.friction.direction
-    viscous = np.array(robot.friction.axes.viscous) + [along.viscous, along.viscous, along.yaw_viscous]
+    viscous = np.add(robot.friction.axes.viscous, (along.viscous, along.viscous, along.yaw_viscous))
     lines = []
     for axis, level in enumerate(viscous):
         if level > 0.0:

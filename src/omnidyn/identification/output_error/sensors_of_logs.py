@@ -66,8 +66,8 @@ def has_gyroscope(run: Run | None) -> bool:
     """Whether omega comes from a gyroscope: it was measured, and no speed along x or y."""
     if run is None or run.twist is None:
         return False
-    measured = np.isfinite(run.twist).any(axis=0)
-    return bool(measured[2] and not measured[:2].any())
+    along, across, turning = (bool(np.isfinite(column).any()) for column in run.twist.T)
+    return turning and not along and not across
 
 
 def _gyroscope(runs: Sequence[Run], wheels: Wheels, left: float | None = None) -> dict[str, float]:
