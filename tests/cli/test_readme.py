@@ -30,7 +30,7 @@ def run(arguments, folder):
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=True,
         env={**os.environ, "PYTHONPATH": str(ROOT / "src")},
     )
