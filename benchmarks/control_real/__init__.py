@@ -56,7 +56,9 @@ POOLED = ("camera 1 mm", "camera 2 mm")  # of three seeds; rivals stand behind a
 SEEDS = (0, 1, 2)
 MOST_LOST = {"pid": 0.15, "mpc": 0.05}  # share of the pooled cells
 JITTER, SKIP, ALLOWED = 2e-3, 0.5, 1.1  # [s], [s], times the best
+GAINS, INTEGRALS, MOST_OF_BEST = 20, (0.0, 250.0), 1.3  # of a speed loop: how many; k_i [V/rad]; rms over the least
 COUNTS = (0.05, 0.2)  # [mm], [mrad] a difference that counts
+CONTROLLERS = {"pid": Pid, "mpc": Mpc}
 OURS, RIVALS = ("pid", "mpc"), ("PID + kS", "LQR + I", "PI + FF")
 COLUMNS = ("PID", "PID + kS", "LQR + I", "PI + FF", "pid", "mpc")
 
@@ -250,9 +252,31 @@ def table_of(robots: dict[str, Numbers], names: list[str]) -> Table:
     return table
 
 
+def add_gains(table: Table) -> None:
+    """LeKiwi on the clover under other gains of its firmware: rows, and each of ours beside its own best."""
+    name, path = "lekiwi", paths(SLOWER["lekiwi"])["clover"]
+    known = told(robot_of(name, NUMBERS[name]), "encoder")
+    found: dict[str, list[float]] = {control: [] for control in OURS}
+    for ki in np.linspace(*INTEGRALS, GAINS).tolist():
+        proportional, _, rate = NUMBERS[name]["loop"]
+        plant = Plant(NUMBERS[name] | {"loop": (proportional, ki, rate)})
+        robot = known.replace(drive=known.drive.replace(ki=ki))
+        cells = {control: errors(plant, CONTROLLERS[control](robot), path, "encoder") for control in OURS}
+        words = {control: f"{cell[0]:.2f}/{cell[1]:.2f}" for control, cell in cells.items()}
+        table.add(robot=f"{name}, ki = {ki:.0f}", path=path.name, sensors="encoder", **words)
+        for control in OURS:
+            found[control].append(cells[control][0])
+    for control, rms in found.items():
+        ratio = max(rms) / min(rms)
+        goal, met = (f"{MOST_OF_BEST:g} times", ratio <= MOST_OF_BEST) if control == "mpc" else ("", None)
+        table.add(goal, met, robot=f"{name}, {GAINS} gains", path=control, lost=f"{ratio:.2f} times its best")
+
+
 def measure() -> Table:
-    """All robots on all paths."""
-    return table_of(NUMBERS, list(paths()))
+    """All robots on all paths, and the gains of a speed loop."""
+    table = table_of(NUMBERS, list(paths()))
+    add_gains(table)
+    return table
 
 
 def main(arguments: list[str]) -> None:

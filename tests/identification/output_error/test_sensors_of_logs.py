@@ -1,0 +1,74 @@
+"""What a fit writes of the sensors of its logs: of a gyroscope, the noise and bias that were added to a simulation."""
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.control.pose_estimator import BY_TURN, TURN_BY_TIME, estimator_numbers
+from omnidyn.identification.output_error.sensors_of_logs import _gyroscope, has_gyroscope
+from omnidyn.model.robot_file import parse_robot, robot_to_toml
+
+AXEBOT = omnidyn.load_robot("axebot")
+DT, NOISE, BIAS, TICK = 0.02, 5e-3, 8e-3, 2.0 * np.pi / 2048
+
+
+def log_with_gyroscope(wheels: str, levels=(-5.0, 5.0), own_clock: bool = False):
+    """10 s by volts, counts or speeds of wheels and omega of a gyroscope that is off by BIAS and NOISE."""
+    rng = np.random.default_rng(0)
+    volts = np.repeat(rng.uniform(*levels, (20, 3)), 25, axis=0)
+    run = omnidyn.simulate(AXEBOT, volts, DT)
+    omega = run.twist[:, 2] + BIAS + NOISE * rng.standard_normal(len(run.t))
+    if own_clock:
+        omega[::3] = np.nan
+    twist = np.column_stack([np.full((len(run.t), 2), np.nan), omega])
+    turned = np.cumsum(0.5 * (run.wheel_speed[1:] + run.wheel_speed[:-1]) * DT, axis=0)
+    angle = np.floor(np.concatenate([np.zeros((1, 3)), turned]) / TICK) * TICK
+    speed = run.wheel_speed + 0.02 * rng.standard_normal(run.wheel_speed.shape)
+    measured = {"wheel_angle": angle} if wheels == "counts" else {"wheel_speed": speed}
+    return omnidyn.Run(t=run.t, voltage=run.voltage, twist=twist, **measured)
+
+
+@pytest.mark.parametrize(("wheels", "own_clock"), [("counts", False), ("counts", True), ("speeds", False)])
+def test_noise_and_bias_of_a_gyroscope_stand_in_the_table_of_the_log(wheels, own_clock):
+    fitted = omnidyn.identify(log_with_gyroscope(wheels, own_clock=own_clock), AXEBOT, quick=True).robot
+    assert fitted.log.gyro_noise == pytest.approx(NOISE, rel=0.15)
+    assert fitted.log.gyro_bias == pytest.approx(BIAS, rel=0.15)
+    again = parse_robot(robot_to_toml(fitted))
+    assert again.log == fitted.log
+    sensors = again.sensor_model
+    assert (sensors.gyro_noise, sensors.gyro_bias) == (fitted.log.gyro_noise, fitted.log.gyro_bias)
+    assert sensors.has_gyroscope
+    assert again.sensors is None
+
+
+def test_controllers_expect_the_drift_of_that_gyroscope():
+    """By time, by its bias, and not by how far the robot has turned, as wheels do."""
+    fitted = omnidyn.identify(log_with_gyroscope("counts"), AXEBOT, quick=True).robot
+    late = {"pose_delay": 0.06, "pose_rate": 30.0}
+    told = fitted.replace(sensors=fitted.sensor_model.replace(**late))
+    plain = fitted.replace(sensors=fitted.sensor_model.replace(**late, gyro_noise=None, gyro_bias=None))
+    by_gyroscope, by_wheels = (estimator_numbers(robot, DT) for robot in (told, plain))
+    assert by_gyroscope[BY_TURN] == 0.0 < by_wheels[BY_TURN]
+    assert by_gyroscope[TURN_BY_TIME] - by_wheels[TURN_BY_TIME] == pytest.approx(BIAS + NOISE * np.sqrt(DT), rel=0.15)
+
+
+def test_a_robot_that_only_spins_shows_no_bias():
+    """A bias of it is a slightly other size of the robot."""
+    rng = np.random.default_rng(1)
+    volts = np.full((500, 3), 3.0)
+    run = omnidyn.simulate(AXEBOT, volts, DT)
+    omega = run.twist[:, 2] + BIAS + NOISE * rng.standard_normal(len(run.t))
+    twist = np.column_stack([np.full((len(run.t), 2), np.nan), omega])
+    log = omnidyn.Run(t=run.t, voltage=run.voltage, twist=twist, wheel_speed=run.wheel_speed)
+    shown = _gyroscope([log], AXEBOT.wheels)
+    assert shown["gyro_noise"] == pytest.approx(NOISE, rel=0.15)
+    assert "gyro_bias" not in shown
+
+
+def test_a_twist_of_all_axes_is_no_gyroscope():
+    run = log_with_gyroscope("counts")
+    twist = np.array(run.twist)
+    twist[:, :2] = 0.1
+    whole = omnidyn.Run(t=run.t, voltage=run.voltage, twist=twist, wheel_angle=run.wheel_angle)
+    assert has_gyroscope(run)
+    assert not has_gyroscope(whole)
