@@ -1,6 +1,6 @@
 """The first picture of the README: a drive that no fit saw, over the model before and after.
 
-    python docs/first_picture.py
+python docs/first_picture.py
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ def main() -> None:
         before, after = omnidyn.load_robot(guess), omnidyn.load_robot(fit)
     drive = omnidyn.read_log(DRIVES[2], before, assume=TICKS)
     found = omnidyn.compare(before, drive, after)
-    runs = dict(zip(("model from sizes", "fitted to two drives"), (found.simulated[k][0] for k in found.robots), strict=True))
+    runs = dict(
+        zip(("model from sizes", "fitted to two drives"), (found.simulated[k][0] for k in found.robots), strict=True)
+    )
     with look():
         figure = new_figure(WIDTH, 3.6)
         top, bottom = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": (2, 1)})

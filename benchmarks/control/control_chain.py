@@ -116,9 +116,7 @@ def add_ordinary(table: Table, robot: str, numbers: Numbers) -> None:
     true = robot_of(robot, numbers)
     wheels = true.wheels.replace(wheel_inertia=0.0)
     loop = numbers.get("loop", ())
-    guess = first_guess(
-        "ordinary", wheels, true.body.mass, float(np.max(true.motor.voltage_limit)), speed_loop=loop
-    )
+    guess = first_guess("ordinary", wheels, true.body.mass, float(np.max(true.motor.voltage_limit)), speed_loop=loop)
     fitted = omnidyn.identify(ordinary_log(numbers), guess).robot
     tuned = {name: omnidyn.tune(fitted, None, name) for name in CONTROLLERS}
     for name, found in tuned.items():

@@ -1,5 +1,5 @@
-"""Makes drive1.csv to drive3.csv: a robot with four wheels, simulated with NumPy alone, so that what omnidyn finds can be
-compared with what is true. Its friction near rest is smooth, which no model of omnidyn holds exactly.
+"""Makes drive1.csv to drive3.csv: a robot with four wheels, simulated with NumPy alone, so that what omnidyn finds can
+be compared with what is true. Its friction near rest is smooth, which no model of omnidyn holds exactly.
 
     python make.py
 """
@@ -9,7 +9,10 @@ import numpy as np
 MASS, INERTIA = 4.2, 0.075  # [kg], [kg m²]
 RADIUS, ARM, ANGLES = 0.04, 0.17, np.radians([45, 135, 225, 315])  # [m], [m], of the wheels around the robot
 RESISTANCE, CONSTANT, GEAR, ROTOR = 1.9, 0.0105, 30.0, 9.0e-7  # [ohm], [N m/A] and [V s/rad], -, [kg m²]
-COULOMB, VISCOUS = np.array([5.6, 5.6, 0.55]), np.array([3.1, 3.1, 0.06])  # along x and y [N], in turning [N m]; N s/m, N m s
+COULOMB, VISCOUS = (
+    np.array([5.6, 5.6, 0.55]),
+    np.array([3.1, 3.1, 0.06]),
+)  # along x and y [N], in turning [N m]; N s/m, N m s
 BATTERY, LATE, COUNTS = 11.8, 0.012, 2048  # [V]; [s] until a duty arrives; a turn of a wheel
 ROW, STEP = 0.01, 0.0002  # [s] between two rows of the log, of the simulation
 

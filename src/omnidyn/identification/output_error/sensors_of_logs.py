@@ -35,7 +35,7 @@ def sensors_shown(records: Sequence[Record], wheels: Wheels, noise: Mapping[str,
 def _is_possible(name: str, value: float) -> bool:
     """Whether a file can hold it: a sensor beyond that, such as a pose each 20 s, is none that a controller has."""
     try:
-        LogEffects(**{name: value})
+        LogEffects().replace(**{name: value})
     except InputError:
         return False
     return True
@@ -52,7 +52,7 @@ def _poses(runs: Sequence[Run]) -> dict[str, float]:
         is_new = np.append(True, (np.diff(poses, axis=0) != 0.0).any(axis=1))[: len(t)]
         t, poses = t[is_new], poses[is_new]
         seconds.append(np.diff(t))
-        if not _is_stamped(run, rows):
+        if not _is_stamped(run, np.asarray(rows)):
             rows_apart.append(usual_step(run.t))
         thirds.append(np.diff(np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])]), n=3, axis=0))
     if sum(map(len, thirds)) < LEAST_POSES:
