@@ -77,7 +77,7 @@ QUESTIONS = (
 
 
 def found(index: dict[str, Any], typed: str) -> list[str]:
-    """The pages that hold all the words, the best first: words of titles count 15, of the text 5, parts of words less."""
+    """The pages that hold all the words, the best first: words of titles count 15, of text 5, parts of words less."""
     from sphinx.search.en import SearchEnglish
 
     english, scores = SearchEnglish({}), []
@@ -112,7 +112,7 @@ def part(terms: dict[str, Any], word: str, page: int) -> bool:
 
 
 def clicks(index: dict[str, Any], question: Question) -> tuple[str, int, int]:
-    """The page that answers, its place among the results (from 1), and the clicks until it is open; 0 where it is not."""
+    """The page that answers, its place among the results (from 1), and the clicks to it; 0 where there is none."""
     pages = found(index, question.typed)
     for page in pages[:FIRST]:
         if page in question.pages:

@@ -1,5 +1,5 @@
-"""Makes drive1.csv to drive3.csv: a robot with four wheels, simulated with NumPy alone, so that what omnidyn finds can be
-compared with what is true. Its friction near rest is smooth, which no model of omnidyn holds exactly.
+"""Makes drive1.csv to drive3.csv: a robot with four wheels, simulated with NumPy alone, so that what omnidyn finds can
+be compared with what is true. Its friction near rest is smooth, which no model of omnidyn holds exactly.
 
     python make.py
 """

@@ -30,7 +30,7 @@ def run(arguments, folder):
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=True,
         env={**os.environ, "PYTHONPATH": str(ROOT / "src")},
     )
@@ -64,6 +64,7 @@ def test_the_commands_on_a_log_print_what_stands_below_them(tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     part = README[README.index("## Your log") : README.index("## What it does")]
     said = ""
+    part = re.sub(r"\\\n\s+", "", part)
     for line in re.findall(r"^    omnidyn (.*)$", part, re.MULTILINE):
         assert main(shlex.split(line)) == 0, capsys.readouterr().err
         said += capsys.readouterr().out

@@ -111,8 +111,8 @@ def test_equal_models_are_the_same_and_few_blocks_cannot_tell():
 
 
 def test_how_far_wheels_turn_in_each_tenth_of_a_second_tells_of_one_log():
-    """Two models whose speeds are equally wrong by draws of 20 s: at most about 5 % of the logs may say otherwise. Their
-    angles wander off, and tell nothing of one log; a model three times as wrong is found."""
+    """Two models whose speeds are equally wrong by draws of 20 s: at most about 5 % of the logs may say otherwise.
+    Their angles wander off, and tell nothing of one log; a model three times as wrong is found."""
     random, told, found = np.random.default_rng(9), 0, 0
     for _ in range(100):
         true, *wrong = (np.cumsum(0.01 * coloured(random, 2000, 0.9)) for _ in range(4))

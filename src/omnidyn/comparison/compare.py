@@ -198,16 +198,15 @@ def _by_segment(traces: Mapping[str, list[Trace]], channels: Sequence[str]) -> d
 def _differences(
     traces: Sequence[Mapping[str, list[Trace]]], channels: Sequence[str], seed: int
 ) -> dict[str, ModelDifference]:
-    """Which model is nearer in each component. An angle of a wheel counts from its start, and a free run wanders off it:
+    """Which model is nearer in each component. An angle of a wheel counts from its start, and a free run wanders off:
     one log is one piece, which could tell nothing. How far the wheel turns in each tenth of a second tells."""
     first, second = traces
     pairs = []
     for key in channels:
-        sides, each_s = (first[key], second[key]), 0.0
-        if is_counted(key):
-            each_s = EACH
-            sides = tuple([changes(trace, EACH) for trace in side if len(trace.t)] for side in sides)
-        gap = difference(*sides, len(channels), seed, whole=counts_from_start(key) and not each_s)
+        a, b, each_s = first[key], second[key], EACH if is_counted(key) else 0.0
+        if each_s:
+            a, b = ([changes(trace, each_s) for trace in side if len(trace.t)] for side in (a, b))
+        gap = difference(a, b, len(channels), seed, whole=counts_from_start(key) and not each_s)
         pairs.append((key, gap and replace(gap, each_s=each_s)))
     return {key: gap for key, gap in pairs if gap is not None}
 
