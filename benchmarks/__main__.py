@@ -25,7 +25,6 @@ NAMES = {
     "simulate": "one robot, 10 s at 1 kHz: time and error beside scipy's LSODA with tanh friction",
     "inductance": "what winding inductance costs: exact engine with L > 0 beside L = 0, 10 s at 1 kHz",
     "rest": "60 s inside the dead zone: the robot must not move at all",
-    "plant": "implicit engine: cost of a step, iterations of the solver, error against cost beside scipy and MuJoCo",
     "environments": "65,536 environments: steps a second, checkers, a million steps beside plain Python (3 minutes)",
     "campaigns": "shards beside the batch kernel, a million closed loops, overhead of a shard on Dask (five minutes)",
     # logs
@@ -58,13 +57,11 @@ NAMES = {
     # real
     "real_fit": "output error on real logs: the motor bench and udea, fitted on some runs, run on others",
     # control
-    "control": "tracking on the eight references of the peers, seven conditions, every controller (three minutes)",
     "control_plants": "tracking of richer robots: identified numbers beside those of a data sheet (two minutes)",
     "control_mismatch": "the same with wrong friction, payload, slip, jumps, missing samples, latency (a minute)",
     "control_chain": "log, identify, track on these plants: a guessed robot beside the fitted one (two minutes)",
     "control_casadi": "the predictive controller beside CasADi with IPOPT on these plants (a minute)",
     "tune": "what tune finds, on an independent plant: errors before and after, three robots and sensors (15 minutes)",
-    "mpc": "the predictive controller: a step beside others' in the same run, cold starts, tracking, C (8 minutes)",
     # export
     "exports": "the paper's robot in C, FMU, MuJoCo, python-control, WPILib: errors, drift at rest (a minute)",
     "exported_c": "exported C on a million random calls under sanitizers: findings, the slowest call (four minutes)",

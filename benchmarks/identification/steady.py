@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import MotorLine, SteadyState
@@ -23,7 +24,7 @@ from omnidyn.run import Run
 from tests.support import real_logs as logs
 from tests.support.steady_logs import FRICTIONS, TRUTH, clean_runs, robot_with, spoiled
 
-DRAWS, DIRECTIONS = 200, range(0, 360, 15)
+DRAWS, DIRECTIONS = scaled(200, 2), range(0, 360, 15)
 SHARE = (0.4, 0.95)
 TRAVEL = {
     "gray 0.1": (39.27, 0.30, 2.51),
