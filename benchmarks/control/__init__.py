@@ -1,3 +1,3 @@
-"""Closed loops: control_plants on the models here; control_chain, control_mismatch, control_casadi and tune on the plants
-of benchmarks/control_real.
+"""Closed loops: control_plants on the models here; control_chain, control_mismatch, control_casadi and tune on those of
+benchmarks/control_real.
 """
