@@ -5,16 +5,16 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any, cast
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 import omnidyn
-from omnidyn.attempts import Attempts, not_made
 from omnidyn.cli import log_options as options
 from omnidyn.cli.identify_logs import MOTOR_TABLE, Loaded, LogFiles, LogReading, load_data, table_kind
-from omnidyn.cli.identify_show import Out, say_written
+from omnidyn.cli.identify_motors import tell_motors
+from omnidyn.cli.identify_show import Out
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal import identify_options
 from omnidyn.cli.terminal.flags import flags
@@ -22,9 +22,7 @@ from omnidyn.cli.terminal.help import MORE_PANEL
 from omnidyn.cli.terminal.identify_options import MOTORS, IdentifyRequest
 from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
-from omnidyn.cli.terminal.streams import say
-from omnidyn.cli.terminal.telling import end_failed, tell
-from omnidyn.document import apart, sentence
+from omnidyn.cli.terminal.telling import end_failed
 from omnidyn.errors import InputError
 from omnidyn.files import check_output
 from omnidyn.identification.methods import FRICTION_METHODS, MOTOR_METHODS, OutputError, SteadyState
@@ -32,9 +30,6 @@ from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
     from omnidyn.identification.default_method import Choice
-    from omnidyn.identification.identification import Identification
-    from omnidyn.identification.motors.into_robot import MotorNumbers
-    from omnidyn.identification.motors.study import MotorStudy
     from omnidyn.identification.planning.got import Promises
     from omnidyn.model.robot import Robot
 
@@ -150,7 +145,7 @@ def _identify(given: LogFiles, robot: str, request: IdentifyRequest, reading: Lo
         if result.interrupted:
             progress(Report("interrupted: the numbers are the best so far, not the best there are", urgent=True))
         if isinstance(result.method, MOTOR_METHODS):
-            _tell(result, start, record, to, progress)
+            tell_motors(result, start, record, to, progress)
             return
         tell_fits(result, attempts, record, to, progress, of_points=not isinstance(loaded.data, list))
     if result.failures:
@@ -167,43 +162,3 @@ def _choice(loaded: Loaded, request: IdentifyRequest, robot: Robot | None, progr
         return Choice(default_motor_method(loaded.data, request.input, progress))
     assert robot is not None
     return default_method(loaded.data, as_driven(robot, loaded.data), request.hold_out, progress)
-
-
-# The part of `omnidyn identify` for motors: write the robot file and the page, show the result
-
-
-def _tell(result: Identification, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress) -> None:
-    study = cast("MotorStudy", result.study)
-    attempts, report, numbers = Attempts(), "", _into_file(study, robot, record, to)
-    document = study.document()
-    if numbers is not None:
-        document = replace(document, parts=apart(document.parts, numbers.parts()))
-    if to.report:
-        progress(Report("drawing"))
-        report = to.write_report(attempts, result, record)
-    progress(Report("writing"))
-    verdict = " ".join([document.verdict_text, *(sentence(str(statement)) for statement in not_made(attempts.missing))])
-    document = replace(document, verdict=verdict, data={**document.data, "verdict": verdict})
-    robot_dict, omissions = numbers.to_dict() if numbers is not None else None, [*map(asdict, attempts.missing)]
-    tell(document, to.json, record, robot=robot_dict, output=to.files.get(""), report=report or None, missing=omissions)
-    say_written([*to.files.values(), report])
-    to.finish(attempts)
-    if study.failed:
-        end_failed(study.verdict)
-
-
-def _into_file(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out) -> MotorNumbers | None:
-    """Write the robot file where one is asked for, and the logs determine a number of it."""
-    from omnidyn.identification.motors.into_robot import motors_into_robot
-
-    if not to.out:
-        return None
-    if robot is None:
-        say("omnidyn: a robot file needs the robot that the motors belong to, --robot ROBOT; -o is not used")
-        return None
-    numbers = motors_into_robot(study, robot)
-    if numbers.value:
-        to.save({"": numbers.robot}, record["inputs"])
-    else:
-        say("omnidyn: the logs determine no number of a robot file; -o is not used")
-    return numbers

@@ -11,8 +11,9 @@ from typing import Any
 from omnidyn.arguments import MADE_BY, check_order, is_frame
 from omnidyn.attempts import BY_QUICK, COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, Attempts
 from omnidyn.errors import INTERRUPTS, InputError, told_by
-from omnidyn.findings.finding import Verdict, rest_on_guesses
+from omnidyn.findings.finding import Verdict
 from omnidyn.findings.fitness import STEADY as STEADY_USE
+from omnidyn.findings.guessed import rest_on_guesses
 from omnidyn.identification.advice import advice
 from omnidyn.identification.default_method import Choice, as_driven, default_method, why_not_output_error
 from omnidyn.identification.estimate import Estimate
