@@ -44,4 +44,4 @@ def _at_its_clock(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
 
 def late_by(work: LogUnderCheck, channel: str) -> float:
     """By how many rows of the work a mean makes a channel late; 0 where it is none."""
-    return work.known.get("late", {}).get(channel, 0.0) / work.step
+    return work.facts.get("late", {}).get(channel, 0.0) / work.step

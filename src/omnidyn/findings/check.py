@@ -116,7 +116,7 @@ def check_log(log: Log, robot: Robot | None = None) -> Verdict:
     length = float(work.t[-1] - work.t[0]) if len(work) > 1 else 0.0
     return Verdict(
         in_order(findings),
-        work.known.get("excitation", {}),
+        work.facts.get("excitation", {}),
         len(log),
         length,
         1.0 / work.step if work.step > 0.0 else 0.0,

@@ -75,7 +75,7 @@ def _without_stand_in(work: LogUnderCheck) -> LogUnderCheck:
 
     Its column was exchanged with the dead one, and nothing can be said of a robot of which two wheels are not known.
     """
-    dead, expected = work.known.get("dead_wheel"), expected_wheel_speed(work, without="wheel_speed")
+    dead, expected = work.facts.get("dead_wheel"), expected_wheel_speed(work, without="wheel_speed")
     if dead is None or expected is None:
         return work
     speed = work.channels["wheel_speed"]
@@ -298,11 +298,11 @@ def _wheel_lines(work: LogUnderCheck) -> tuple[str, list[Slope], list[float]] | 
 
 def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """One wheel that differs from the others: its own radius, gear or counter."""
-    line = _wheel_lines(work) if work.known.get("dead_wheel") is None else None
-    if line is None or (work.known.get("floor_ratio") is None and line[0] != CURRENT_AND_VOLTAGE):
+    line = _wheel_lines(work) if work.facts.get("dead_wheel") is None else None
+    if line is None or (work.facts.get("floor_ratio") is None and line[0] != CURRENT_AND_VOLTAGE):
         return [], work
     source, slopes, sizes = line
-    ratio = work.known.get("floor_ratio")
+    ratio = work.facts.get("floor_ratio")
     if ratio is not None and abs(ratio.value - 1.0) > 0.1:
         return [], work  # a robot that slips does so more in one direction than in another
     coarse = [10.0 * quantum(column) for column in work.channels["wheel_speed"].T]
