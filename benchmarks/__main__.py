@@ -37,7 +37,6 @@ NAMES = {
     # identification
     "steady": "steady-state identification: real logs beside their README; coverage on simulated ones (3 minutes)",
     "floors": "changes of friction inside a run: how many are named, of one floor too, beside two halves (a minute)",
-    "large": "identify on three logs of 40 s at 200 Hz, four wheels, 12 channels: time, memory (ten minutes)",
     "laws_identified": "Stribeck, Dahl, LuGre fitted back from logs of other integrators: coverage, std (an hour)",
     "laws_ladder": "Stribeck, LuGre, slip under a plain file: found, named, taken by the ladder, held (40 minutes)",
     "groups": "two floors in one likelihood: coverage of their differences, bootstrap over runs (two minutes)",
