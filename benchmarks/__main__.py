@@ -35,7 +35,6 @@ NAMES = {
     "fuzz_readers": "every reader on mutated and random bytes, 60 s each: only errors of omnidyn may leave it",
     "stagger": "topics with clocks of their own: check, geometry and fits beside equal stamps (two minutes)",
     # identification
-    "steady": "steady-state identification: real logs beside their README; coverage on simulated ones (3 minutes)",
     "floors": "changes of friction inside a run: how many are named, of one floor too, beside two halves (a minute)",
     "laws_identified": "Stribeck, Dahl, LuGre fitted back from logs of other integrators: coverage, std (an hour)",
     "laws_ladder": "Stribeck, LuGre, slip under a plain file: found, named, taken by the ladder, held (40 minutes)",
