@@ -77,8 +77,8 @@ def test_a_limit_becomes_a_guess_of_the_file_so_that_its_other_guesses_stay_free
     """With `free` the guesses of the file would be held: friction of 0 for 5.6 N on a robot of `init`."""
     limit = Remedy("motor.current_limit_A", quoted("a current limit of about 2.8 A"), 0.5, 0.1, share=0.9, chi2=900.0)
     (words,) = map(str, missing(limit))
-    assert words.endswith('put about that value into the robot file, current_limit_A = { value = .., origin = "guess" }, '
-                          "and fit again")  # fmt: skip
+    how = 'current_limit_A = { value = .., origin = "guess" }'
+    assert words.endswith(f"put about that value into the robot file, {how}, and fit again")
     text = (Path(__file__).parents[2] / "src/omnidyn/model/presets/axebot.toml").read_text("utf-8")
     robot = parse_robot(text.replace("[motor]", '[motor]\ncurrent_limit_A = { value = 2.8, origin = "guess" }'))
     assert guesses(robot) == ("motor.current_limit_A",)
