@@ -37,6 +37,7 @@ ROOMS = (
     "steady",
     "lines",
     "live",
+    "driving",
 )
 
 

@@ -1,0 +1,160 @@
+"""What is to be driven: rows of inputs, and the legs that they make. Words, pictures and commands come from these rows.
+
+A leg is a stretch of rows in which some motor gets something, with the rest behind it. Where it leads is what the robot
+of the file does under the same rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.document import Document, Table
+from omnidyn.errors import InputError
+from omnidyn.model.drive import DUTY, SPEED
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+from omnidyn.shown import Displayable
+from omnidyn.simulation.simulate import simulate
+from omnidyn.statement import NOTE, Statement, as_verdict
+
+CHANNELS = {DUTY: "duty", SPEED: "wheel_speed_command"}  # kind of drive -> channel of its input; else voltage
+UNITS = {"voltage": "V", "duty": "duty", "wheel_speed_command": "rad/s"}
+STILL = (0.005, np.radians(1.0))  # [m], [rad]: less is no way
+TURN_ONLY = 0.1  # [m] a rad: less way beside a turn is not named
+
+
+class Leg(NamedTuple):
+    """One way from rest to rest.
+
+    first, end: its rows, the rest behind it included. way: where it leads, from where it began, in the frame of the
+    body there (forward, left, counter-clockwise) [m, m, rad]. pose: where it ends, in the room.
+    """
+
+    first: int
+    end: int
+    way: tuple[float, float, float]
+    pose: tuple[float, float, float]
+
+    @property
+    def words(self) -> str:
+        """Where it leads, in words: "forward 0.52 m, left 0.10 m", "turn left 35 deg"."""
+        return in_words(self.way)
+
+
+@dataclass(frozen=True, eq=False)
+class DriveProgram(Displayable):
+    """Rows to drive.
+
+    robot: that drives them. dt [s]: of a row. inputs (rows, wheels): volts, duties, or rad/s of its speed loop. area
+    [m]: free floor along x and y; it begins in the middle, along x. source: where the rows come from.
+    """
+
+    robot: Robot
+    dt: float
+    inputs: FloatArray
+    area: tuple[float, float] = (3.0, 3.0)
+    source: str = ""
+
+    @property
+    def channel(self) -> str:
+        """The channel of a Run that its inputs are."""
+        return CHANNELS.get(self.robot.drive.kind, "voltage")
+
+    @property
+    def unit(self) -> str:
+        """Of the inputs."""
+        return UNITS[self.channel]
+
+    @property
+    def seconds(self) -> float:
+        """How long it lasts [s]."""
+        return len(self.inputs) * self.dt
+
+    @cached_property
+    def predicted(self) -> Run:
+        """What the robot of the file does under these rows, from the middle of the room."""
+        given = {self.channel: self.inputs}
+        supply = {"supply": self.robot.drive.supply} if self.channel == "duty" else {}
+        return simulate(self.robot, dt=self.dt, **given, **supply)
+
+    @cached_property
+    def legs(self) -> tuple[Leg, ...]:
+        """The ways from rest to rest."""
+        moves = (self.inputs != 0.0).any(axis=1)
+        starts = np.flatnonzero(moves & ~np.concatenate([[False], moves[:-1]]))
+        ends = [*starts[1:].tolist(), len(self.inputs)]
+        pose = np.asarray(self.predicted.pose)
+        return tuple(
+            Leg(int(first), end, way_between(pose[first], pose[end]), tuple(pose[end].tolist()))
+            for first, end in zip(starts.tolist(), ends, strict=True)
+        )
+
+    @property
+    def verdict(self) -> Statement:
+        """What is to be driven, and how far it goes."""
+        reach = np.abs(np.asarray(self.predicted.pose)[:, :2]).max(axis=0)
+        numbers = {"legs": len(self.legs), "seconds": self.seconds, "reach": reach.tolist(), "area": self.area}
+        return Statement("drive_program", NOTE, self.robot.name, numbers)
+
+    def document(self) -> Document:
+        """Its legs."""
+        rows = [
+            (f"{k}", f"{leg.first * self.dt:.1f}", leg.words, *(f"{value:.2f}" for value in leg.pose[:2]),
+             f"{np.degrees(leg.pose[2]):.0f}")
+            for k, leg in enumerate(self.legs, 1)
+        ]  # fmt: skip
+        table = Table(("leg", "starts s", "leads, as predicted", "ends x m", "y m", "heading deg"), rows, "><<>>>", name="legs")
+        return Document([table], as_verdict(self.verdict) | self.to_dict(), verdict=self.verdict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON, but for the rows."""
+        legs = [
+            {"start_s": leg.first * self.dt, "end_s": leg.end * self.dt, "words": leg.words, "pose": list(leg.pose)}
+            for leg in self.legs
+        ]
+        return {
+            "robot": self.robot.name,
+            "seconds": self.seconds,
+            "row_s": self.dt,
+            "unit": self.unit,
+            "area_m": list(self.area),
+            "legs": legs,
+        }
+
+    def from_leg(self, number: int) -> DriveProgram:
+        """The program from a leg on, counted from 0."""
+        if not 0 <= number < len(self.legs):
+            raise InputError("no such leg", got=number, expected=f"0 to {len(self.legs) - 1}", where="leg")
+        rest = round(0.5 / self.dt)
+        first = max(self.legs[number].first - rest, 0)
+        return replace(self, inputs=self.inputs[first:])
+
+
+def way_between(start: FloatArray, end: FloatArray) -> tuple[float, float, float]:
+    """From one pose to another, in the frame of the body at the first."""
+    dx, dy, turn = (np.asarray(end) - np.asarray(start)).tolist()
+    cosine, sine = np.cos(start[2]), np.sin(start[2])
+    return float(cosine * dx + sine * dy), float(cosine * dy - sine * dx), float(turn)
+
+
+def in_words(way: Sequence[float]) -> str:
+    """A way in words, its largest part first."""
+    forward, left, turn = way
+    far = np.hypot(forward, left) > TURN_ONLY * abs(turn)
+    parts = [
+        (abs(forward), f"{'forward' if forward > 0 else 'back'} {abs(forward):.2f} m", far and abs(forward) > STILL[0]),
+        (abs(left), f"{'left' if left > 0 else 'right'} {abs(left):.2f} m", far and abs(left) > STILL[0]),
+        (
+            0.0 if far else 10.0,
+            f"turn {'left' if turn > 0 else 'right'} {abs(np.degrees(turn)):.0f} deg",
+            abs(turn) > STILL[1],
+        ),
+    ]
+    said = [words for _, words, is_way in sorted(parts, key=lambda part: -part[0]) if is_way]
+    return ", ".join(said) or "hardly moves"
