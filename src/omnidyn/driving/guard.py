@@ -92,7 +92,8 @@ class Guard:
         """Silence, and commands that do not arrive."""
         if now - self._heard > self.limits.silence:
             return _stop("drive_silent", seconds=now - self._heard)
-        if self._unanswered and now - self._unanswered[0][1] > self.limits.dead_man:
+        is_heard = now - self._heard < 0.5 * self.limits.silence  # else it is silence, if it lasts
+        if is_heard and self._unanswered and now - self._unanswered[0][1] > self.limits.dead_man:
             return _stop("drive_late", seconds=now - self._unanswered[0][1])
         return None
 

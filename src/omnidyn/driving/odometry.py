@@ -11,6 +11,8 @@ from omnidyn.driving.program import way_between
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
 
+SMOOTHED = 0.1  # [s] over which a speed is taken
+
 
 class Odometry:
     """Adds up what is measured, from the middle of the room.
@@ -59,7 +61,7 @@ class Odometry:
         if self._pose is not None and t > self._pose[0]:
             before, seconds = self._pose[1], t - self._pose[0]
             self.body = _sum(self.body, wheel_speed(self._wheels, np.array(way_between(before, pose))))
-            self.speed = (pose - before)[:2] / seconds
+            self._at_speed((pose - before)[:2], seconds)
         self.place, self._pose = np.array(pose), (t, np.array(pose))
 
     def _moved(self, way: FloatArray, step: float) -> None:
@@ -68,7 +70,11 @@ class Odometry:
         cosine, sine = np.cos(heading), np.sin(heading)
         moved = np.array([cosine * way[0] - sine * way[1], sine * way[0] + cosine * way[1], way[2]])
         self.place = self.place + moved
-        self.speed = moved[:2] / step if step > 0.0 else self.speed
+        self._at_speed(moved[:2], step)
+
+    def _at_speed(self, way: FloatArray, seconds: float) -> None:
+        """The speed, smoothed over SMOOTHED."""
+        self.speed = self.speed + (way - seconds * self.speed) / (SMOOTHED + seconds)
 
 
 def _sum(total: FloatArray | None, more: FloatArray) -> FloatArray:

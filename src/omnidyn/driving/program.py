@@ -26,25 +26,30 @@ from omnidyn.statement import NOTE, Statement, as_verdict
 CHANNELS = {DUTY: "duty", SPEED: "wheel_speed_command"}  # kind of drive -> channel of its input; else voltage
 UNITS = {"voltage": "V", "duty": "duty", "wheel_speed_command": "rad/s"}
 STILL = (0.005, np.radians(1.0))  # [m], [rad]: less is no way
+BACK = 0.2  # of its farthest way: a leg that comes back by more says so
 TURN_ONLY = 0.1  # [m] a rad: less way beside a turn is not named
 
 
 class Leg(NamedTuple):
     """One way from rest to rest.
 
-    first, end: its rows, the rest behind it included. way: where it leads, from where it began, in the frame of the
-    body there (forward, left, counter-clockwise) [m, m, rad]. pose: where it ends, in the room.
+    first, end: its rows, the rest behind it included. way, farthest: from where it began, in the frame of the body there
+    (forward, left, counter-clockwise) [m, m, rad], to its end and to where it is farthest. pose: of its end, in the room.
     """
 
     first: int
     end: int
     way: tuple[float, float, float]
+    farthest: tuple[float, float, float]
     pose: tuple[float, float, float]
 
     @property
     def words(self) -> str:
-        """Where it leads, in words: "forward 0.52 m, left 0.10 m", "turn left 35 deg"."""
-        return in_words(self.way)
+        """Where it leads, in words: "forward 0.52 m, left 0.10 m", "turn left 35 deg and back by 27 deg"."""
+        back = np.subtract(self.way, self.farthest)
+        if _size(back) < BACK * _size(self.farthest):
+            return in_words(self.way)
+        return f"{in_words(self.farthest)}, then {in_words(back)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +96,7 @@ class DriveProgram(Displayable):
         ends = [*starts[1:].tolist(), len(self.inputs)]
         pose = np.asarray(self.predicted.pose)
         return tuple(
-            Leg(int(first), end, way_between(pose[first], pose[end]), tuple(pose[end].tolist()))
+            Leg(first, end, way_between(pose[first], pose[end]), _farthest(pose[first : end + 1]), tuple(pose[end].tolist()))
             for first, end in zip(starts.tolist(), ends, strict=True)
         )
 
@@ -141,6 +146,16 @@ def way_between(start: FloatArray, end: FloatArray) -> tuple[float, float, float
     dx, dy, turn = (np.asarray(end) - np.asarray(start)).tolist()
     cosine, sine = np.cos(start[2]), np.sin(start[2])
     return float(cosine * dx + sine * dy), float(cosine * dy - sine * dx), float(turn)
+
+
+def _farthest(pose: FloatArray) -> tuple[float, float, float]:
+    """The way to where a leg is farthest from where it began."""
+    far = np.hypot(*(pose[:, :2] - pose[0, :2]).T) + TURN_ONLY * np.abs(pose[:, 2] - pose[0, 2])
+    return way_between(pose[0], pose[int(np.argmax(far))])
+
+
+def _size(way: Sequence[float]) -> float:
+    return float(np.hypot(way[0], way[1]) + TURN_ONLY * abs(way[2]))
 
 
 def in_words(way: Sequence[float]) -> str:

@@ -29,8 +29,8 @@ class Fault(NamedTuple):
     """What goes wrong, and when.
 
     kind: late (the line takes `size` seconds more), deaf (no command arrives), mute (nothing measured arrives), reset
-    (the firmware begins anew), halts (the motors have no power), clock (its clock jumps by `size` seconds), reversed and
-    stuck (a wheel), supply (the battery has `size` volts), pushed (away, at `size` m/s).
+    (the firmware begins anew), halts (the motors have no power), clock (its clock jumps by `size` seconds), reversed (the
+    wires of a motor), stuck (a wheel, which neither turns nor is turned, as its encoder sees it), supply (the battery has `size` volts), pushed (forward, with `size` newtons).
     """
 
     kind: str
@@ -157,7 +157,7 @@ class SimulatedRobot:
             self.last_driven = until
         before = self.live.wheel_speed
         self.live.step(np.where(self._alive, self._sign * inputs, 0.0), seconds)
-        self._angle += 0.5 * seconds * (before + self.live.wheel_speed)
+        self._angle += 0.5 * seconds * self._alive * (before + self.live.wheel_speed)
         self._time = until
 
     def _take(self, command: Command | None) -> None:
@@ -173,15 +173,15 @@ class SimulatedRobot:
         if self._mute or self._time < self._silent_until:
             return
         live, channels = self.live, dict[str, FloatArray]()
-        sign = self._sign * self._alive
+        turns = self._alive
         for channel, std in self.noise.items():
             if channel == "wheel_angle":
-                channels[channel] = std * np.floor(sign * self._angle / std)
+                channels[channel] = std * np.floor(self._angle / std)
                 continue
             if channel == "current":
                 exact = settled_currents(self.robot, live.twist, reaching(self.robot, live.voltage))
             else:
-                exact = live.wheel_speed * sign if channel == "wheel_speed" else getattr(live, channel)
+                exact = live.wheel_speed * turns if channel == "wheel_speed" else getattr(live, channel)
             channels[channel] = exact + std * self._rng.standard_normal(len(std))
         if self._supply:
             channels["supply"] = np.array([self._supply])
@@ -212,4 +212,4 @@ class SimulatedRobot:
         elif fault.kind == SUPPLY:
             self._supply = self.live.supply = fault.size
         elif fault.kind == PUSHED:
-            self.live.push((10.0 * fault.size * self.robot.body.mass, 0.0, 0.0))
+            self.live.push((fault.size, 0.0, 0.0))
