@@ -31,9 +31,13 @@ SIM, STDOUT = "sim", "-"
 def drive(
     plan: str = typer.Argument(metavar="PLAN", help="The CSV file of omnidyn plan, or another command file."),
     to: str = typer.Option(
-        SIM, "--to", metavar="PLACE", help="sim (a simulated robot), - (standard output), udp:HOST:PORT, serial:PORT[:BAUD]."
+        SIM,
+        "--to",
+        metavar="PLACE",
+        help="sim (a simulated robot), - (standard output), udp:HOST:PORT, serial:PORT[:BAUD]; or files: csv, page, "
+        "arduino, ros2, ftc, wpilib.",
     ),
-    out: str = typer.Option("", "-o", "--out", metavar="LOG", help="Log of the drive, as identify reads it."),
+    out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Log of the drive; or the file or folder of files."),
     robot: str = typer.Option("", "--robot", metavar="ROBOT", help="A preset or robot file; default: that of the plan."),
     area: str = typer.Option("", metavar="XxY", help="Free floor [m]; default: that of the plan."),
     plant: str = typer.Option("", "--plant", metavar="ROBOT", help="What a simulated robot is in truth; default: ROBOT."),
@@ -45,20 +49,28 @@ def drive(
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
     json: bool = typer.Option(False, "--json", help="For machines."),
 ) -> None:
-    """Drive a robot through a plan, and record it.
+    """Drive a robot through a plan, and record it; or write files by which it drives itself.
 
     It stops by itself: at the border of the room, where the robot is silent or late, where a wheel does not turn as
     predicted or slips, where the supply is low, where the key is released. Exit code 4 where it was stopped; the log is
     still written.
     """
     from omnidyn.driving.program_file import read_program
+    from omnidyn.export.drives.kinds import KINDS, program_files
 
-    check_output(out, force) if out else None
+    if out and to not in KINDS:
+        check_output(out, force)
     keep_inputs([], [robot, plant], [plan], out)
     program = read_program(plan, omnidyn.load_robot(robot) if robot else None, _sizes(area) if area else None)
     record = provenance([input_file("plan", plan), *([robot_input(robot)] if robot else [])])
     if dry_run:
         tell(program.document(), json, record)
+        return
+    if to in KINDS:
+        exported = program_files(program, to)
+        written = [str(path) for path in exported.write(out, force)] if out else []
+        tell(exported.document(), json, record, output=written or None)
+        say(f"omnidyn: wrote {', '.join(written)}" if written else "omnidyn: nothing written; -o OUT writes it")
         return
     if to != SIM and not out:
         raise InputError("nowhere to record the drive", got="no file", expected="-o LOG", where="-o")

@@ -81,6 +81,11 @@ class DriveProgram(Displayable):
         """How long it lasts [s]."""
         return len(self.inputs) * self.dt
 
+    def commands(self) -> Run:
+        """Its rows, as `read_commands` takes them."""
+        t = np.asarray(self.dt * np.arange(len(self.inputs)), dtype=float)
+        return Run(t=t, source=self.source, **{self.channel: self.inputs})
+
     @cached_property
     def predicted(self) -> Run:
         """What the robot of the file does under these rows, from the middle of the room."""
