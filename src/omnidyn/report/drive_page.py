@@ -7,7 +7,7 @@ import numpy as np
 from omnidyn.document import sentence
 from omnidyn.driving.program import DriveProgram
 from omnidyn.report.figures.drive import draw_program
-from omnidyn.report.html import Section, escaped, page, section, table
+from omnidyn.report.html import Section, page, section, table
 
 
 def render_drive(program: DriveProgram) -> str:
@@ -37,7 +37,7 @@ def render_drive(program: DriveProgram) -> str:
     from omnidyn import __version__
 
     return page(
-        f"A drive for {escaped(program.robot.name)}",
+        f"A drive for {program.robot.name}",
         stops,
         sections,
         {"omnidyn": __version__, **record},

@@ -89,7 +89,7 @@ static inline bool omnidyn_take(omnidyn_line *line, uint32_t now, char *text)
     for (k = 0; k < 4; k++) {
         if (*next != ',')
             return false;
-        fields[k] = strtoul(next + 1, &next, 10);
+        fields[k] = (uint32_t)strtoul(next + 1, &next, 10);
     }
     for (k = 0; k < OMNIDYN_WHEELS; k++) {
         if (*next != ',')
@@ -157,9 +157,10 @@ _SKETCH = """
 static void motor(int wheel, float input) { (void)wheel; (void)input; }
 static float angle(int wheel) { (void)wheel; return 0.0f; }
 static float supply() { return NAN; }
+#if !OMNIDYN_BY_LINE
 static bool held() { return false; }
-
 static omnidyn_drive drive;
+#endif
 static omnidyn_line line;
 static uint32_t printed;
 
