@@ -51,6 +51,12 @@ class Leg(NamedTuple):
             return in_words(self.way)
         return f"{in_words(self.farthest)}, then {in_words(back)}"
 
+    @property
+    def cells(self) -> tuple[str, str, str]:
+        """Its end as text: x [m], y [m], heading [deg]; no -0."""
+        x, y = np.round(self.pose[:2], 2) + 0.0
+        return f"{x:.2f}", f"{y:.2f}", f"{np.round(np.degrees(self.pose[2])) + 0.0:.0f}"
+
 
 @dataclass(frozen=True, eq=False)
 class DriveProgram(Displayable):
@@ -106,6 +112,15 @@ class DriveProgram(Displayable):
         )
 
     @property
+    def returns(self) -> tuple[bool, ...]:
+        """Of each leg, whether it is the mirror image of the one before, and leads back."""
+        rows = [self.inputs[leg.first : leg.end] for leg in self.legs]
+        mirrors = [False]
+        for before, after in zip(rows, rows[1:], strict=False):
+            mirrors.append(not mirrors[-1] and np.array_equal(before, -after))
+        return tuple(mirrors[: len(rows)])
+
+    @property
     def verdict(self) -> Statement:
         """What is to be driven, and how far it goes."""
         reach = np.abs(np.asarray(self.predicted.pose)[:, :2]).max(axis=0)
@@ -115,10 +130,9 @@ class DriveProgram(Displayable):
     def document(self) -> Document:
         """Its legs."""
         rows = [
-            (f"{k}", f"{leg.first * self.dt:.1f}", leg.words, *(f"{value:.2f}" for value in leg.pose[:2]),
-             f"{np.degrees(leg.pose[2]):.0f}")
+            (f"{k}", f"{leg.first * self.dt:.1f}", leg.words, *leg.cells)
             for k, leg in enumerate(self.legs, 1)
-        ]  # fmt: skip
+        ]
         table = Table(("leg", "starts s", "leads, as predicted", "ends x m", "y m", "heading deg"), rows, "><<>>>", name="legs")
         return Document([table], as_verdict(self.verdict) | self.to_dict(), verdict=self.verdict)
 

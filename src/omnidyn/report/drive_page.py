@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from omnidyn.document import sentence
 from omnidyn.driving.program import DriveProgram
 from omnidyn.report.figures.drive import draw_program
@@ -12,22 +10,16 @@ from omnidyn.report.html import Section, page, section, table
 
 def render_drive(program: DriveProgram) -> str:
     """The page of a program, as HTML."""
-    rows = [
-        (
-            str(k),
-            f"{leg.first * program.dt:.1f}",
-            leg.words,
-            f"{leg.pose[0]:+.2f}",
-            f"{leg.pose[1]:+.2f}",
-            f"{np.degrees(leg.pose[2]):+.0f}",
-            "\N{BALLOT BOX}",
-        )
-        for k, leg in enumerate(program.legs, 1)
-    ]
-    head = ("move", "at s", "leads, as predicted", "x m", "y m", "heading deg", "")
+    rows, returns = [], (*program.returns, False)
+    for k, leg in enumerate(program.legs):
+        if returns[k]:
+            continue
+        number, words = (f"{k + 1}, {k + 2}", f"{leg.words}, and back") if returns[k + 1] else (f"{k + 1}", leg.words)
+        rows.append((number, f"{leg.first * program.dt:.1f}", words, *leg.cells, "\N{BALLOT BOX}"))
+    head = ("move", "at s", "leads, as predicted", "ends at x m", "y m", "heading deg", "seen")
     stops = (
-        "Begin at the ring, along the arrow: x to the right of the picture, y up. Stop where it does otherwise than this "
-        "page says, or comes near the border."
+        "Begin at the ring, along the arrow: x to the right of the picture, y up. Where a move leads back, its end is "
+        "that of the way there. Stop where it does otherwise than this page says, or comes near the border."
     )
     sections = [
         section("room", "The room", draw_program(program)),
