@@ -80,7 +80,7 @@ def test_fifty_of_fifty_healthy_robots_drive_to_the_end():
 def test_each_fault_is_named(fault, codes):
     clock = SimulatedClock()
     noise = {"wheel_angle": np.full(3, 0.003)}
-    robot = SimulatedRobot(PROGRAM.robot, clock, noise, rate=1.0 / DT, faults=[fault], supply=12.0)
+    robot = SimulatedRobot(PROGRAM.robot, noise, clock=clock, rate=1.0 / DT, faults=[fault], supply=12.0)
     record = drive(PROGRAM, robot, clock=clock, limits=Limits(supply=9.0))
     assert record.stopped is not None
     assert record.stopped.code in codes
@@ -99,14 +99,14 @@ def test_a_wheel_that_spins_while_the_body_stands_is_slip():
                 for one in super().receive()
             ]
 
-    record = drive(PROGRAM, OnIce(PROGRAM.robot, clock, noise, rate=1.0 / DT), clock=clock)
+    record = drive(PROGRAM, OnIce(PROGRAM.robot, noise, clock=clock, rate=1.0 / DT), clock=clock)
     assert record.stopped is not None
     assert record.stopped.code == "drive_slip"
 
 
 def test_nobody_answers():
     clock = SimulatedClock()
-    robot = SimulatedRobot(PROGRAM.robot, clock, {"twist": np.full(3, 0.01)}, faults=[Fault("mute", 0.0)])
+    robot = SimulatedRobot(PROGRAM.robot, {"twist": np.full(3, 0.01)}, clock=clock, faults=[Fault("mute", 0.0)])
     record = drive(PROGRAM, robot, clock=clock)
     assert record.stopped is not None
     assert (record.stopped.code, record.run, record.rows) == ("drive_no_answer", None, 0)
@@ -114,7 +114,7 @@ def test_nobody_answers():
 
 def test_a_slow_line_is_refused_before_anything_moves():
     clock = SimulatedClock()
-    robot = SimulatedRobot(PROGRAM.robot, clock, {"twist": np.full(3, 0.01)}, rate=1.0 / DT, delay=0.1)
+    robot = SimulatedRobot(PROGRAM.robot, {"twist": np.full(3, 0.01)}, clock=clock, rate=1.0 / DT, delay=0.1)
     record = drive(PROGRAM, robot, clock=clock)
     assert record.stopped is not None
     assert record.stopped.code == "drive_slow_line"
@@ -131,7 +131,7 @@ def test_a_broken_line_and_a_hand_stop_keep_the_log():
                     raise error
                 super().send(command)
 
-        robot = Breaks(PROGRAM.robot, clock, {"twist": np.full(3, 0.01)}, rate=1.0 / DT)
+        robot = Breaks(PROGRAM.robot, {"twist": np.full(3, 0.01)}, clock=clock, rate=1.0 / DT)
         record = drive(PROGRAM, robot, clock=clock)
         assert record.stopped is not None
         assert record.run is not None

@@ -80,7 +80,7 @@ class FarRobot:
     def __init__(self, read, write):
         self.clock = PumpedClock(self.pump)
         noise = {"wheel_speed": np.full(3, 0.05), "pose": np.full(3, 0.002)}
-        self.robot = SimulatedRobot(PROGRAM.robot, self.clock, noise, rate=1.0 / DT)
+        self.robot = SimulatedRobot(PROGRAM.robot, noise, clock=self.clock, rate=1.0 / DT)
         self.lines, self.write, self.stops = Lines(read), write, 0
         self.robot.open()
 

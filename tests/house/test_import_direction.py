@@ -39,6 +39,7 @@ FLOORS = (
     "comparison",
     "identification",
     "control",
+    "driving",
     "campaigns",
     "telling",
     "paper",

@@ -67,7 +67,7 @@ def driven(program: DriveProgram, robot: omnidyn.Robot, rng: np.random.Generator
     seed, delay = int(rng.integers(1 << 30)), float(rng.uniform(0.0, 0.03))
     faults = [fault] if fault is not None else []
     simulated = SimulatedRobot(
-        robot, clock, noise, rate=1.0 / DT, delay=delay, faults=faults, supply=SUPPLY_V, seed=seed
+        robot, noise, clock=clock, rate=1.0 / DT, delay=delay, faults=faults, supply=SUPPLY_V, seed=seed
     )
     released = fault.at + rng.uniform(-0.1, 0.5) if fault is not None and rng.random() < 0.5 else np.inf
     record = drive(program, simulated, clock=clock, limits=Limits(supply=9.0), held=lambda: clock.now() < released)

@@ -40,6 +40,9 @@ def drive(
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Log of the drive; or the file or folder of files."),
     robot: str = typer.Option("", "--robot", metavar="ROBOT", help="A preset or robot file; default: that of the plan."),
     area: str = typer.Option("", metavar="XxY", help="Free floor [m]; default: that of the plan."),
+    resume: list[str] = typer.Option(
+        [], "--resume", metavar="LOG", help="Log of a drive of PLAN that was stopped: drive what is left. Repeatable."
+    ),
     plant: str = typer.Option("", "--plant", metavar="ROBOT", help="What a simulated robot is in truth; default: ROBOT."),
     seed: int = typer.Option(0, min=0, help="Of the noise of a simulated robot."),
     dead_man: float = typer.Option(0.25, metavar="S", help="After a stop no motor gets anything longer than that [s]."),
@@ -60,9 +63,13 @@ def drive(
 
     if out and to not in KINDS:
         check_output(out, force)
-    keep_inputs([], [robot, plant], [plan], out)
+    keep_inputs([], [robot, plant], [plan, *resume], out)
     program = read_program(plan, omnidyn.load_robot(robot) if robot else None, _sizes(area) if area else None)
-    record = provenance([input_file("plan", plan), *([robot_input(robot)] if robot else [])])
+    inputs = [input_file("plan", plan), *([robot_input(robot)] if robot else [])]
+    if resume:
+        program = _rest(program, plan, resume)
+        inputs += [input_file("log", path) for path in resume]
+    record = provenance(inputs)
     if dry_run:
         tell(program.document(), json, record)
         return
@@ -87,28 +94,35 @@ def drive(
         end_failed(driven.verdict)
 
 
+def _rest(program: DriveProgram, plan: str, logs: list[str]) -> DriveProgram:
+    """What is left of a plan, after the drives of these logs."""
+    from omnidyn.driving.program_file import plan_beside
+    from omnidyn.driving.resume import rest_of
+
+    runs = [omnidyn.read_log(path, robot=program.robot) for path in logs]
+    with shown_progress("planning the rest") as progress:
+        return rest_of(program, runs, plan_beside(plan), progress)
+
+
 def _drive(
     program: DriveProgram, plan: str, to: str, truth: Robot, seed: int, stops: tuple[float, float | None], hold: bool
 ) -> DriveRecord:
     """The drive, with a simulated robot or a real one."""
-    from omnidyn.driving.clock import RealClock, SimulatedClock
     from omnidyn.driving.drive import drive as run
     from omnidyn.driving.guard import Limits
     from omnidyn.driving.program_file import plan_beside
     from omnidyn.driving.senders import sender
     from omnidyn.driving.simulated import SimulatedRobot
-    from omnidyn.identification.planning.recorded import noise_of
 
     limits = Limits(stops[0], stops[0], stops[1])
     with shown_progress("driving") as progress:
         if to == SIM:
-            clock, beside = SimulatedClock(), plan_beside(plan)
-            noise = beside.noise if beside else noise_of(program.robot, program.dt)
-            robot = SimulatedRobot(truth, clock, noise, rate=1.0 / program.dt, seed=seed)
-            return run(program, robot, limits=limits, clock=clock, progress=progress)
+            beside = plan_beside(plan)
+            robot = SimulatedRobot(truth, beside.noise if beside else None, rate=1.0 / program.dt, seed=seed)
+            return run(program, robot, limits=limits, progress=progress)
         connection = sender(to, program.robot.wheels.count)
         with _held(hold) as held:
-            return run(program, connection, limits=limits, clock=RealClock(), held=held, progress=progress)
+            return run(program, connection, limits=limits, held=held, progress=progress)
 
 
 @contextlib.contextmanager

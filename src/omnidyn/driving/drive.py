@@ -40,12 +40,25 @@ def drive(
         program: What is to be driven; `read_program` reads what `omnidyn plan` wrote.
         connection: To the robot, such as `SimulatedRobot`.
         limits: When to stop.
-        clock: Real time by default.
+        clock: Default: that of a simulated robot, else real time.
         held: Whether a key that must be held down still is.
         progress: Hears what is done.
+
+    >>> import omnidyn
+    >>> robot = omnidyn.load_robot("axebot")
+    >>> forward = [[0.0, 3.0, -3.0]] * 50 + [[0.0, 0.0, 0.0]] * 25
+    >>> program = omnidyn.DriveProgram(robot, 0.02, forward)
+    >>> print(program.legs[0].words)
+    forward 0.36 m
+    >>> omnidyn.drive(program, omnidyn.SimulatedRobot(robot)).is_complete
+    True
     """
     check_order("drive(program, connection)", (program, DriveProgram), (connection, object))
-    return _Driver(program, connection, limits or Limits(), clock or RealClock(), held or (lambda: True), progress).run()
+    return _Driver(program, connection, limits or Limits(), clock or _clock_of(connection), held or (lambda: True), progress).run()
+
+
+def _clock_of(connection: object) -> Clock:
+    return getattr(connection, "clock", None) or RealClock()
 
 
 class _Driver:

@@ -20,6 +20,7 @@ from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.shown import Displayable
+from omnidyn.simulation.commands import as_floats
 from omnidyn.simulation.simulate import simulate
 from omnidyn.statement import NOTE, Statement, as_verdict
 
@@ -71,6 +72,13 @@ class DriveProgram(Displayable):
     inputs: FloatArray
     area: tuple[float, float] = (3.0, 3.0)
     source: str = ""
+
+    def __post_init__(self) -> None:
+        rows = as_floats("inputs", self.inputs)
+        wheels = self.robot.wheels.count
+        if rows.ndim != 2 or not len(rows) or rows.shape[1] != wheels or not np.isfinite(rows).all():
+            raise InputError("wrong rows", got=rows.shape, expected=f"numbers, shape (rows, {wheels})", where="inputs")
+        object.__setattr__(self, "inputs", rows)
 
     @property
     def channel(self) -> str:

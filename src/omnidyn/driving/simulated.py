@@ -5,14 +5,15 @@ from __future__ import annotations
 import heapq
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.driving.clock import Clock
+from omnidyn.driving.clock import Clock, SimulatedClock
 from omnidyn.driving.connection import Command, Measured
 from omnidyn.driving.dead_man import DeadMan
+from omnidyn.identification.planning.recorded import noise_of
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.actuation import reaching
 from omnidyn.model.robot import Robot
@@ -44,8 +45,8 @@ class SimulatedRobot:
 
     Args:
         robot: What it is in truth.
-        clock: Of the drive; the robot goes on as it does.
-        noise: Channel -> std of what it measures, as `plan` has it; of wheel_angle the step of a count [rad].
+        noise: Channel -> std of what it measures, as for `plan`.
+        clock: Of the drive; the robot goes on as it does. Default: a simulated one, which nobody waits for.
         rate: Of what it measures [Hz].
         delay: Of the line, each way [s].
         faults: What goes wrong.
@@ -56,16 +57,17 @@ class SimulatedRobot:
     def __init__(
         self,
         robot: Robot,
-        clock: Clock,
-        noise: Mapping[str, FloatArray],
+        noise: Mapping[str, Any] | None = None,
         *,
+        clock: Clock | None = None,
         rate: float = 100.0,
         delay: float = 0.0,
         faults: Sequence[Fault] = (),
         supply: float | None = None,
         seed: int = 0,
     ) -> None:
-        self.robot, self.clock, self.noise, self.period = robot, clock, noise, 1.0 / rate
+        self.robot, self.clock, self.period = robot, clock or SimulatedClock(), 1.0 / rate
+        self.noise = noise_of(robot, self.period, noise)
         self.delay, self.faults = delay, deque(sorted(faults, key=lambda fault: fault.at))
         self._rng = np.random.default_rng(seed)
         self._supply = supply or robot.drive.supply or 0.0

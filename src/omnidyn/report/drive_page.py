@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 from omnidyn.document import sentence
 from omnidyn.driving.program import DriveProgram
 from omnidyn.report.figures.drive import draw_program
@@ -25,13 +27,12 @@ def render_drive(program: DriveProgram) -> str:
         section("room", "The room", draw_program(program)),
         Section("moves", "Moves, and where each should end", table(head, rows, "moves")),
     ]
-    record = {"command": f"omnidyn drive --to page, of {program.source or 'a program'}", "inputs": []}
-    from omnidyn import __version__
-
+    version = sys.modules["omnidyn"].__version__
+    record = {"omnidyn": version, "command": f"omnidyn drive {program.source}.csv --to page", "inputs": []}
     return page(
         f"A drive for {program.robot.name}",
         stops,
         sections,
-        {"omnidyn": __version__, **record},
+        record,
         verdict=sentence(str(program.verdict)),
     )
