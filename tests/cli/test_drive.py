@@ -29,7 +29,9 @@ def test_a_simulated_robot_is_driven_and_recorded(call, here, commands):
 
 
 def test_a_dry_run_sends_and_writes_nothing(call, here, commands):
-    code, out, _ = call("drive", commands, "--robot", "axebot", "--to", "serial:/dev/none", "--dry-run", "-o", "log.csv")
+    code, out, _ = call(
+        "drive", commands, "--robot", "axebot", "--to", "serial:/dev/none", "--dry-run", "-o", "log.csv"
+    )
     assert (code, (here / "log.csv").exists()) == (0, False)
     assert out.startswith("2 legs in 2.8 s for axebot: up to 0.56 m along x and 0.00 m along y, in 3 m x 3 m.")
     code, out, _ = call("drive", commands, "--robot", "axebot", "--dry-run", "--json")
@@ -61,11 +63,11 @@ def test_what_is_left_is_driven(call, here):
 @pytest.mark.parametrize("kind", ["csv", "page", "arduino", "ros2", "ftc", "wpilib"])
 def test_files_are_written(call, here, commands, kind):
     out = {"csv": "again.csv", "page": "page.html"}.get(kind, kind)
-    code, told, err = call("drive", commands, "--robot", "axebot", "--to", kind, "-o", out)
+    code, told, _ = call("drive", commands, "--robot", "axebot", "--to", kind, "-o", out)
     assert code == 0
     assert (here / out).exists()
     assert f"axebot as {kind}" in told
-    code, _, err = call("drive", commands, "--robot", "axebot", "--to", kind, "-o", out)
+    code, _, _ = call("drive", commands, "--robot", "axebot", "--to", kind, "-o", out)
     assert code == 3  # it is there
 
 

@@ -101,7 +101,11 @@ def test_a_program_beside_the_json_of_another_is_refused(plan, tmp_path):
 
 def test_a_json_that_is_no_plan_is_refused(plan, tmp_path):
     (tmp_path / "plan.csv").write_text(plan.read_text())
-    for broken in ({}, {"robot_file": "name = 3"}, {**json.loads(plan.with_suffix(".json").read_text()), "area_m": [1]}):
+    for broken in (
+        {},
+        {"robot_file": "name = 3"},
+        {**json.loads(plan.with_suffix(".json").read_text()), "area_m": [1]},
+    ):
         (tmp_path / "plan.json").write_text(json.dumps(broken))
         with pytest.raises(InputError, match=r"no plan in this file|plan\.json"):
             read_program(tmp_path / "plan.csv")

@@ -50,7 +50,9 @@ def test_a_measurement_comes_back():
 
 def test_a_clock_of_microseconds_that_begins_again_goes_on():
     lines = MeasuredLines(3)
-    times = [lines.of(body(line(f"M,{micros % 2**32},1,1"))) for micros in (2**32 - 100, 2**32 + 100, 2**32 + 2_000_000_000)]
+    times = [
+        lines.of(body(line(f"M,{micros % 2**32},1,1"))) for micros in (2**32 - 100, 2**32 + 100, 2**32 + 2_000_000_000)
+    ]
     assert [round(one.t * 1e6) for one in times if one] == [2**32 - 100, 2**32 + 100, 2**32 + 2_000_000_000]
 
 
@@ -142,8 +144,8 @@ def test_over_udp():
 def test_over_standard_output(monkeypatch):
     (from_robot, to_drive), (from_drive, to_robot) = os.pipe(), os.pipe()
     try:
-        monkeypatch.setattr(sys, "stdin", open(from_robot, closefd=False))
-        monkeypatch.setattr(sys, "stdout", open(to_robot, "w", closefd=False))
+        monkeypatch.setattr(sys, "stdin", types.SimpleNamespace(fileno=lambda: from_robot))
+        monkeypatch.setattr(sys, "stdout", types.SimpleNamespace(fileno=lambda: to_robot))
         check("-", FarRobot(of_pipe(from_drive), lambda data: os.write(to_drive, data)))
     finally:
         for number in (from_robot, to_drive, from_drive, to_robot):

@@ -55,7 +55,9 @@ public abstract class LinearOpMode {
   public boolean opModeIsActive() { return false; }
 }""",
     f"{_QUALCOMM}/hardware/Gamepad": "public class Gamepad { public volatile boolean a; }",
-    f"{_QUALCOMM}/hardware/Telemetry": "public interface Telemetry { Object addData(String c, Object v); boolean update(); }",
+    f"{_QUALCOMM}/hardware/Telemetry": """public interface Telemetry {
+  Object addData(String c, Object v); boolean update();
+}""",
     f"{_QUALCOMM}/hardware/VoltageSensor": "public interface VoltageSensor { double getVoltage(); }",
     f"{_QUALCOMM}/hardware/DcMotor": """public interface DcMotor {
   enum RunMode { RUN_WITHOUT_ENCODER, STOP_AND_RESET_ENCODER }
@@ -75,7 +77,9 @@ public abstract class LinearOpMode {
 }""",
     "edu/wpi/first/wpilibj/DataLogManager": """import edu.wpi.first.util.datalog.DataLog;
 public class DataLogManager { public static DataLog getLog() { return new DataLog(); } }""",
-    "edu/wpi/first/wpilibj/RobotController": "public class RobotController { public static double getBatteryVoltage() { return 12; } }",
+    "edu/wpi/first/wpilibj/RobotController": """public class RobotController {
+  public static double getBatteryVoltage() { return 12; }
+}""",
     "edu/wpi/first/wpilibj/Timer": "public class Timer { public static double getFPGATimestamp() { return 0; } }",
     "edu/wpi/first/wpilibj2/command/Subsystem": "public interface Subsystem {}",
     "edu/wpi/first/wpilibj2/command/Command": """public abstract class Command {

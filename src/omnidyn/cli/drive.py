@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
@@ -38,12 +37,16 @@ def drive(
         "arduino, ros2, ftc, wpilib.",
     ),
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Log of the drive; or the file or folder of files."),
-    robot: str = typer.Option("", "--robot", metavar="ROBOT", help="A preset or robot file; default: that of the plan."),
+    robot: str = typer.Option(
+        "", "--robot", metavar="ROBOT", help="A preset or robot file; default: that of the plan."
+    ),
     area: str = typer.Option("", metavar="XxY", help="Free floor [m]; default: that of the plan."),
     resume: list[str] = typer.Option(
         [], "--resume", metavar="LOG", help="Log of a drive of PLAN that was stopped: drive what is left. Repeatable."
     ),
-    plant: str = typer.Option("", "--plant", metavar="ROBOT", help="What a simulated robot is in truth; default: ROBOT."),
+    plant: str = typer.Option(
+        "", "--plant", metavar="ROBOT", help="What a simulated robot is in truth; default: ROBOT."
+    ),
     seed: int = typer.Option(0, min=0, help="Of the noise of a simulated robot."),
     dead_man: float = typer.Option(0.25, metavar="S", help="After a stop no motor gets anything longer than that [s]."),
     supply: float | None = typer.Option(None, metavar="V", help="Stop below; default: 0.75 of that in the robot file."),
@@ -81,7 +84,9 @@ def drive(
         return
     if to != SIM and not out:
         raise InputError("nowhere to record the drive", got="no file", expected="-o LOG", where="-o")
-    driven = _drive(program, plan, to, omnidyn.load_robot(plant) if plant else program.robot, seed, (dead_man, supply), hold)
+    driven = _drive(
+        program, plan, to, omnidyn.load_robot(plant) if plant else program.robot, seed, (dead_man, supply), hold
+    )
     if out and driven.run is not None:
         omnidyn.write_run(driven.run, out, force=force)
     if to == STDOUT:
@@ -89,7 +94,9 @@ def drive(
     else:
         tell(driven.document(), json, record, output=out or None)
     if not json:
-        say(f"omnidyn: wrote {out}" if out and driven.run is not None else "omnidyn: nothing written; -o LOG records it")
+        say(
+            f"omnidyn: wrote {out}" if out and driven.run is not None else "omnidyn: nothing written; -o LOG records it"
+        )
     if not driven.is_complete:
         end_failed(driven.verdict)
 

@@ -54,7 +54,9 @@ def drive(
     True
     """
     check_order("drive(program, connection)", (program, DriveProgram), (connection, object))
-    return _Driver(program, connection, limits or Limits(), clock or _clock_of(connection), held or (lambda: True), progress).run()
+    return _Driver(
+        program, connection, limits or Limits(), clock or _clock_of(connection), held or (lambda: True), progress
+    ).run()
 
 
 def _clock_of(connection: object) -> Clock:

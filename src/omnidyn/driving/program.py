@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,8 +35,9 @@ TURN_ONLY = 0.1  # [m] a rad: less way beside a turn is not named
 class Leg(NamedTuple):
     """One way from rest to rest.
 
-    first, end: its rows, the rest behind it included. way, farthest: from where it began, in the frame of the body there
-    (forward, left, counter-clockwise) [m, m, rad], to its end and to where it is farthest. pose: of its end, in the room.
+    first, end: its rows, the rest behind it included. way, farthest: from where it began, in the frame of the body
+    there (forward, left, counter-clockwise) [m, m, rad], to its end and to where it is farthest. pose: of its end, in
+    the room.
     """
 
     first: int
@@ -115,7 +117,13 @@ class DriveProgram(Displayable):
         ends = [*starts[1:].tolist(), len(self.inputs)]
         pose = np.asarray(self.predicted.pose)
         return tuple(
-            Leg(first, end, way_between(pose[first], pose[end]), _farthest(pose[first : end + 1]), tuple(pose[end].tolist()))
+            Leg(
+                first,
+                end,
+                way_between(pose[first], pose[end]),
+                _farthest(pose[first : end + 1]),
+                tuple(pose[end].tolist()),
+            )
             for first, end in zip(starts.tolist(), ends, strict=True)
         )
 
@@ -124,7 +132,7 @@ class DriveProgram(Displayable):
         """Of each leg, whether it is the mirror image of the one before, and leads back."""
         rows = [self.inputs[leg.first : leg.end] for leg in self.legs]
         mirrors = [False]
-        for before, after in zip(rows, rows[1:], strict=False):
+        for before, after in pairwise(rows):
             mirrors.append(not mirrors[-1] and np.array_equal(before, -after))
         return tuple(mirrors[: len(rows)])
 
@@ -137,11 +145,10 @@ class DriveProgram(Displayable):
 
     def document(self) -> Document:
         """Its legs."""
-        rows = [
-            (f"{k}", f"{leg.first * self.dt:.1f}", leg.words, *leg.cells)
-            for k, leg in enumerate(self.legs, 1)
-        ]
-        table = Table(("leg", "starts s", "leads, as predicted", "ends x m", "y m", "heading deg"), rows, "><<>>>", name="legs")
+        rows = [(f"{k}", f"{leg.first * self.dt:.1f}", leg.words, *leg.cells) for k, leg in enumerate(self.legs, 1)]
+        table = Table(
+            ("leg", "starts s", "leads, as predicted", "ends x m", "y m", "heading deg"), rows, "><<>>>", name="legs"
+        )
         return Document([table], as_verdict(self.verdict) | self.to_dict(), verdict=self.verdict)
 
     def to_dict(self) -> dict[str, Any]:

@@ -94,7 +94,10 @@ def read_program(
 
 
 def plan_beside(path: str | os.PathLike[str]) -> PlanFile | None:
-    """What `omnidyn plan` wrote beside a program; None where nothing stands there. Raises InputError for another file."""
+    """What `omnidyn plan` wrote beside a program; None where nothing stands there.
+
+    Raises InputError for another file.
+    """
     place = _json_of(path)
     if not place.exists():
         return None

@@ -20,7 +20,9 @@ class Recording:
     def __init__(self) -> None:
         self._sent: list[tuple[float, tuple[float, ...]]] = []
         self._measured: list[Measured] = []
-        self._difference = np.inf  # of the clock of the drive and that of the robot: of the measurement that came fastest
+        self._difference = (
+            np.inf
+        )  # of the clock of the drive and that of the robot: of the measurement that came fastest
 
     def sent(self, now: float, command: Command) -> None:
         """A command that was sent."""

@@ -137,5 +137,7 @@ def _open_serial(port: str, baud: int) -> tuple[Callable[[], bytes], Callable[[b
     try:
         line = serial.Serial(port, baud, timeout=0.0, write_timeout=0.1)
     except (OSError, ValueError) as error:  # SerialException is an OSError
-        raise InputError("cannot open the serial port", got=f"{port}: {error}", expected="a port of this machine") from None
+        raise InputError(
+            "cannot open the serial port", got=f"{port}: {error}", expected="a port of this machine"
+        ) from None
     return lambda: line.read(MOST_BYTES), line.write, line.close

@@ -14,8 +14,8 @@ from omnidyn.driving.clock import Clock, SimulatedClock
 from omnidyn.driving.connection import Command, Measured
 from omnidyn.driving.dead_man import DeadMan
 from omnidyn.identification.planning.recorded import noise_of
-from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.actuation import reaching
+from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.live import LiveRobot
 
@@ -30,8 +30,9 @@ class Fault(NamedTuple):
     """What goes wrong, and when.
 
     kind: late (the line takes `size` seconds more), deaf (no command arrives), mute (nothing measured arrives), reset
-    (the firmware begins anew), halts (the motors have no power), clock (its clock jumps by `size` seconds), reversed (the
-    wires of a motor), stuck (a wheel, which neither turns nor is turned, as its encoder sees it), supply (the battery has `size` volts), pushed (forward, with `size` newtons).
+    (the firmware begins anew), halts (the motors have no power), clock (its clock jumps by `size` seconds), reversed
+    (the wires of a motor), stuck (a wheel: its motor does nothing, and its encoder says so), supply (the battery has
+    `size` volts), pushed (forward, with `size` newtons).
     """
 
     kind: str

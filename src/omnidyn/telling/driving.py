@@ -41,7 +41,8 @@ SENTENCES = {
     ),
     "drive_wrong_way": Sentence(
         "wheel {wheel} turns the other way than it was asked to",
-        "swap the two wires of its motor or the sign in its driver, and see that wheels are counted as in the robot file",
+        "swap the two wires of its motor or the sign in its driver, and see that wheels are counted as in the robot "
+        "file",
     ),
     "drive_stuck": Sentence(
         "wheel {wheel} does not turn as it was asked to",
@@ -52,12 +53,15 @@ SENTENCES = {
         "clean the wheels, take a rougher floor or a lower input, and check the geometry of the robot file",
     ),
     "drive_supply": Sentence(
-        "the supply is {volts:.1f} V, and the least is {least:.1f} V", "charge the battery, then drive the rest with `resume`"
+        "the supply is {volts:.1f} V, and the least is {least:.1f} V",
+        "charge the battery, then drive the rest with `resume`",
     ),
     "drive_released": Sentence("the key was released", "drive the rest with `resume`"),
     "drive_by_hand": Sentence("it was stopped by hand", "drive the rest with `resume`"),
     "drive_slow_loop": Sentence(
         "this computer was held up for {seconds:m.0f} ms", "end other programs, then drive the rest with `resume`"
     ),
-    "drive_line_broke": Sentence("the line to the robot broke: {error}", "plug it in again, and drive the rest with `resume`"),
+    "drive_line_broke": Sentence(
+        "the line to the robot broke: {error}", "plug it in again, and drive the rest with `resume`"
+    ),
 }

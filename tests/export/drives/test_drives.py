@@ -240,7 +240,9 @@ def test_the_receiver_in_c_does_as_that_in_python(tmp_path):
                 dead_man.take(now / 1e6, command)
         wanted.append(dead_man.acting(now / 1e6))
         text.append(f"{now % 2**32} {line.replace('-', '~')}\n")
-    said = subprocess.run(["./line"], cwd=tmp_path / "c", input="".join(text), capture_output=True, text=True, check=True)
+    said = subprocess.run(
+        ["./line"], cwd=tmp_path / "c", input="".join(text), capture_output=True, text=True, check=True
+    )
     got = [tuple(map(float, row.split())) for row in said.stdout.splitlines()]
     assert len(got) == len(wanted) > 1000
     assert sum(any(row) for row in wanted) > 300
@@ -280,7 +282,9 @@ def test_another_kind_is_refused():
 
 def test_pieces_give_every_row():
     rng = np.random.default_rng(0)
-    rows = np.concatenate([np.outer(np.linspace(0, 3, 40), [1, -1, 0.5]), rng.uniform(-6, 6, (7, 3)), np.zeros((30, 3))])
+    rows = np.concatenate(
+        [np.outer(np.linspace(0, 3, 40), [1, -1, 0.5]), rng.uniform(-6, 6, (7, 3)), np.zeros((30, 3))]
+    )
     found = pieces(rows)
     again = np.concatenate([np.array(one.first) + np.arange(one.rows)[:, None] * np.array(one.step) for one in found])
     np.testing.assert_allclose(again, rows, atol=1e-8)

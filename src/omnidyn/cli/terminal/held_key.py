@@ -23,9 +23,7 @@ def held_key() -> Iterator[Callable[[], bool]]:
     except ImportError:
         termios = tty = None  # type: ignore[assignment]
     if termios is None or sys.stdin is None or not sys.stdin.isatty():
-        raise InputError(
-            "no key can be held", got="no terminal", expected="a terminal of Linux or macOS", where="hold"
-        )
+        raise InputError("no key can be held", got="no terminal", expected="a terminal of Linux or macOS", where="hold")
     number = sys.stdin.fileno()
     before = termios.tcgetattr(number)
     tty.setcbreak(number)

@@ -10,8 +10,8 @@ from omnidyn.export.spelling import c_comment, filled
 
 NOTES = (
     "fill in four functions at the top of the sketch: motor, angle, supply and held",
-    "OMNIDYN_BY_LINE 1: the board takes commands of `omnidyn drive --to serial:PORT`; 0: it drives the table by itself, "
-    "and prints the log",
+    "OMNIDYN_BY_LINE 1: the board takes commands of `omnidyn drive --to serial:PORT`; 0: it drives the table by "
+    "itself, and prints the log",
 )
 
 

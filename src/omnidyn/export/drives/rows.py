@@ -19,7 +19,10 @@ DEAD_MAN = 0.25  # [s]
 
 
 class Piece(NamedTuple):
-    """Rows on a straight line. rows: how many. first, step (wheels,): the input of the first one, and from row to row."""
+    """Rows on a straight line.
+
+    rows: how many. first, step (wheels,): the input of the first one, and from row to row.
+    """
 
     rows: int
     first: tuple[float, ...]
@@ -99,6 +102,7 @@ def about(program: DriveProgram) -> list[str]:
     return [
         f"{program.source or 'a program'} for {program.robot.name}, by omnidyn: {program.seconds:.1f} s, "
         f"{len(program.legs)} legs, inputs in {program.unit}.",
-        f"Begin in the middle of {program.area[0]:g} m x {program.area[1]:g} m, along the first side. Wheels on blocks first.",
+        f"Begin in the middle of {program.area[0]:g} m x {program.area[1]:g} m, along the first side. "
+        "Wheels on blocks first.",
         *(f"{leg.first * program.dt:6.1f} s  {leg.words}" for leg in program.legs),
     ]

@@ -128,7 +128,9 @@ def plan_rest(
     """
     width, depth = _room(area)
     dt = 1.0 / rate
-    planner = _Planner(robot, _robots(robot), dt, noise_of(robot, dt, noise), _question(robot, tuple(promised)), driven, promised)
+    planner = _Planner(
+        robot, _robots(robot), dt, noise_of(robot, dt, noise), _question(robot, tuple(promised)), driven, promised
+    )
     return planner.that_tells().planned((width, depth), seconds / (1.0 - HELD_OUT_SHARE), "", progress)
 
 
