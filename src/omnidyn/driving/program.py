@@ -49,7 +49,7 @@ class Leg(NamedTuple):
     @property
     def words(self) -> str:
         """Where it leads, in words: "forward 0.52 m, left 0.10 m", "turn left 35 deg and back by 27 deg"."""
-        back = np.subtract(self.way, self.farthest)
+        back = np.subtract(self.way, self.farthest).tolist()
         if _size(back) < BACK * _size(self.farthest):
             return in_words(self.way)
         return f"{in_words(self.farthest)}, then {in_words(back)}"
@@ -100,14 +100,16 @@ class DriveProgram(Displayable):
     def commands(self) -> Run:
         """Its rows, as `read_commands` takes them."""
         t = np.asarray(self.dt * np.arange(len(self.inputs)), dtype=float)
-        return Run(t=t, source=self.source, **{self.channel: self.inputs})
+        inputs: dict[str, Any] = {self.channel: self.inputs}
+        return Run(t=t, source=self.source, **inputs)
 
     @cached_property
     def predicted(self) -> Run:
         """What the robot of the file does under these rows, from the middle of the room."""
-        given = {self.channel: self.inputs}
-        supply = {"supply": self.robot.drive.supply} if self.channel == "duty" else {}
-        return simulate(self.robot, dt=self.dt, **given, **supply)
+        given: dict[str, Any] = {self.channel: self.inputs}
+        if self.channel == "duty":
+            given["supply"] = self.robot.drive.supply
+        return simulate(self.robot, dt=self.dt, **given)
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,7 @@ class Recording:
         kept = (measured >= 0) & (measured >= np.maximum.accumulate(measured))
         ticks = np.unique(np.concatenate([sent, measured[kept]]))
         inputs = np.array([values for _, values in self._sent])
-        rows = {channel: inputs[np.searchsorted(sent, ticks, side="right") - 1]}
+        rows: dict[str, Any] = {channel: inputs[np.searchsorted(sent, ticks, side="right") - 1]}
         found = [(int(tick), one) for tick, one, keep in zip(measured, self._measured, kept, strict=True) if keep]
         for name in dict.fromkeys(name for _, one in found for name in one.channels):
             values = [(tick, one.channels[name]) for tick, one in found if name in one.channels]

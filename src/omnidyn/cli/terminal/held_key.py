@@ -17,13 +17,14 @@ FIRST, AGAIN = 0.8, 0.25  # [s] until a terminal repeats a key for the first tim
 @contextlib.contextmanager
 def held_key() -> Iterator[Callable[[], bool]]:
     """Whether a key is held down in this terminal. Raises InputError where there is no terminal to read."""
+    refusal = InputError("no key can be held", got="no terminal", expected="a terminal of Linux or macOS", where="hold")
     try:
         import termios
         import tty
     except ImportError:
-        termios = tty = None  # type: ignore[assignment]
-    if termios is None or sys.stdin is None or not sys.stdin.isatty():
-        raise InputError("no key can be held", got="no terminal", expected="a terminal of Linux or macOS", where="hold")
+        raise refusal from None
+    if sys.stdin is None or not sys.stdin.isatty():
+        raise refusal
     number = sys.stdin.fileno()
     before = termios.tcgetattr(number)
     tty.setcbreak(number)

@@ -183,8 +183,10 @@ class _Planner:
 
     def that_tells(self) -> _Planner:
         """The same without what was driven, where that tells nothing: it had hardly begun."""
+        if self.driven is None:
+            return self
         try:
-            told_by(self._logs(self.robot, self.driven, np.random.default_rng(SEED))[:1], self.robot, self.question)
+            told_by([self._recorded(self.robot, self.driven, np.random.default_rng(SEED))], self.robot, self.question)
         except InsufficientDataError:
             return replace(self, driven=None)
         return self
@@ -207,9 +209,9 @@ class _Planner:
         score = self._score(names, aim)
         begun = information[[candidates.index(move) for move in opening]].sum(axis=0)
         if self.driven is not None:
-            told, driven = information_of([self._recorded(self.robot, self.driven, rng)], self.robot, asked)
+            told, more = information_of([self._recorded(self.robot, self.driven, rng)], self.robot, asked)
             places = [names.index(name) for name in told]  # a short drive tells nothing of some
-            begun[np.ix_(places, places)] += driven[0]
+            begun[np.ix_(places, places)] += more[0]
         time = (1.0 - HELD_OUT_SHARE) * seconds - REST - sum(move.duration for move in opening)
         best, best_score = None, math.inf
         count = SEARCHES_OF_REST if self.promised else SEARCHES
