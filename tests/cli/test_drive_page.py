@@ -30,4 +30,4 @@ def test_every_command(call, here):
 def test_its_python(here, capsys):
     (code,) = re.findall(r"^```python\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
     exec(code, {})
-    assert capsys.readouterr().out.splitlines()[0].startswith("forward 0.6")
+    assert capsys.readouterr().out.splitlines()[0].startswith("forward 0.71 m")

@@ -9,7 +9,7 @@ from omnidyn.driving.clock import SimulatedClock
 from omnidyn.driving.drive import drive
 from omnidyn.driving.guard import Limits
 from omnidyn.driving.simulated import FAULTS, Fault, SimulatedRobot
-from tests.support.faulty_drives import DT, axebot_program, driven, random_fault
+from tests.support.faulty_drives import DT, axebot_program, driven, random_fault, with_battery
 
 DEAD_MAN = 0.25
 OFF = {f"friction.axes.{kind}[{axis}]": (0.7, 1.3) for kind in ("viscous", "coulomb") for axis in range(3)}
@@ -80,7 +80,7 @@ def test_fifty_of_fifty_healthy_robots_drive_to_the_end():
 def test_each_fault_is_named(fault, codes):
     clock = SimulatedClock()
     noise = {"wheel_angle": np.full(3, 0.003)}
-    robot = SimulatedRobot(PROGRAM.robot, noise, clock=clock, rate=1.0 / DT, faults=[fault], supply=12.0)
+    robot = SimulatedRobot(with_battery(PROGRAM.robot), noise, clock=clock, rate=1.0 / DT, faults=[fault])
     record = drive(PROGRAM, robot, clock=clock, limits=Limits(supply=9.0))
     assert record.stopped is not None
     assert record.stopped.code in codes

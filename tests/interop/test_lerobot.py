@@ -1,4 +1,4 @@
-"""A robot of LeRobot is driven through a program: a class with the methods of LeRobot's `Robot`, over our simulation."""
+"""A robot of LeRobot is driven: a class with the methods of LeRobot's `Robot`, over our simulation."""
 
 import re
 from pathlib import Path
@@ -101,7 +101,9 @@ def test_the_page_as_it_stands(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     clock = SimulatedClock()
     monkeypatch.setattr("omnidyn.driving.drive.RealClock", lambda: clock)
-    monkeypatch.setattr("omnidyn.interop.LeRobotConnection", lambda r, m: LeRobotConnection(r, m, clock.now), raising=False)
+    monkeypatch.setattr(
+        "omnidyn.interop.LeRobotConnection", lambda r, m: LeRobotConnection(r, m, clock.now), raising=False
+    )
     page = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "lekiwi.md"
     (code,) = re.findall(r"^```python\n(.*?)^```$", page.read_text("utf-8"), re.DOTALL | re.MULTILINE)
     scope = {"robot": Base(clock)}

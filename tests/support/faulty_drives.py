@@ -53,6 +53,11 @@ def axebot_program() -> DriveProgram:
     return DriveProgram(omnidyn.load_robot("axebot"), DT, np.concatenate(rows), AREA)
 
 
+def with_battery(robot: omnidyn.Robot) -> omnidyn.Robot:
+    """The same robot with a battery that it measures."""
+    return robot.replace(drive=robot.drive.replace(supply=SUPPLY_V))
+
+
 def random_fault(rng: np.random.Generator, seconds: float) -> Fault:
     """One of FAULTS, at any moment of a drive."""
     kind = FAULTS[rng.integers(len(FAULTS))]
@@ -67,7 +72,7 @@ def driven(program: DriveProgram, robot: omnidyn.Robot, rng: np.random.Generator
     seed, delay = int(rng.integers(1 << 30)), float(rng.uniform(0.0, 0.03))
     faults = [fault] if fault is not None else []
     simulated = SimulatedRobot(
-        robot, noise, clock=clock, rate=1.0 / DT, delay=delay, faults=faults, supply=SUPPLY_V, seed=seed
+        with_battery(robot), noise, clock=clock, rate=1.0 / DT, delay=delay, faults=faults, seed=seed
     )
     released = fault.at + rng.uniform(-0.1, 0.5) if fault is not None and rng.random() < 0.5 else np.inf
     record = drive(program, simulated, clock=clock, limits=Limits(supply=9.0), held=lambda: clock.now() < released)

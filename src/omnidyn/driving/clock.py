@@ -6,7 +6,7 @@ import time
 from typing import Protocol
 
 
-class Clock(Protocol):
+class DriveClock(Protocol):
     """now: seconds that never go back. sleep_until: wait for that time; no wait where it is past."""
 
     def now(self) -> float: ...

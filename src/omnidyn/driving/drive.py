@@ -7,12 +7,12 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from omnidyn.arguments import check_order
-from omnidyn.driving.clock import Clock, RealClock
+from omnidyn.driving.clock import DriveClock, RealClock
 from omnidyn.driving.connection import Command, RobotConnection
-from omnidyn.driving.guard import Guard, Limits
+from omnidyn.driving.guard import DriveGuard, Limits
 from omnidyn.driving.program import DriveProgram
 from omnidyn.driving.record import DriveRecord
-from omnidyn.driving.recording import Recording
+from omnidyn.driving.recording import DriveRecording
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.statement import WARNING, Statement
 
@@ -26,7 +26,7 @@ def drive(
     connection: RobotConnection,
     *,
     limits: Limits | None = None,
-    clock: Clock | None = None,
+    clock: DriveClock | None = None,
     held: Callable[[], bool] | None = None,
     progress: Progress = silent,
 ) -> DriveRecord:
@@ -49,7 +49,7 @@ def drive(
     >>> forward = [[0.0, 3.0, -3.0]] * 50 + [[0.0, 0.0, 0.0]] * 25
     >>> program = omnidyn.DriveProgram(robot, 0.02, forward)
     >>> print(program.legs[0].words)
-    forward 0.36 m
+    forward 0.71 m
     >>> omnidyn.drive(program, omnidyn.SimulatedRobot(robot)).is_complete
     True
     """
@@ -59,7 +59,7 @@ def drive(
     ).run()
 
 
-def _clock_of(connection: object) -> Clock:
+def _clock_of(connection: object) -> DriveClock:
     return getattr(connection, "clock", None) or RealClock()
 
 
@@ -71,13 +71,13 @@ class _Driver:
         program: DriveProgram,
         connection: RobotConnection,
         limits: Limits,
-        clock: Clock,
+        clock: DriveClock,
         held: Callable[[], bool],
         progress: Progress,
     ) -> None:
         self.program, self.connection, self.limits = program, connection, limits
         self.clock, self.held, self.progress = clock, held, progress
-        self.recording, self.guard = Recording(), Guard(program, limits, 0.0)
+        self.recording, self.guard = DriveRecording(), DriveGuard(program, limits, 0.0)
         self.session, self.number = secrets.randbelow(2**31 - 1) + 1, 0
         self.rows, self.start, self.driven_at = 0, 0.0, float("-inf")
         self.off = (0.0,) * program.robot.wheels.count
@@ -127,7 +127,7 @@ class _Driver:
         """Row by row. A loop that is late goes on from there, and no row is left out."""
         dt, inputs = self.program.dt, self.program.inputs.tolist()
         self.start = due = self.clock.now()
-        self.guard = Guard(self.program, self.limits, self.start)
+        self.guard = DriveGuard(self.program, self.limits, self.start)
         for k, row in enumerate(inputs):
             self.clock.sleep_until(due)
             late = self.clock.now() - due

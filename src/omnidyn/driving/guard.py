@@ -34,7 +34,7 @@ class Limits:
     supply: float | None = None
 
 
-class Guard:
+class DriveGuard:
     """Watches a drive: `sent` and `take` say what happened, `fault` whether to stop now.
 
     start: of the program, on the clock of the drive [s], which all times here are on.
@@ -107,7 +107,7 @@ class Guard:
 
     def _of_wheels(self) -> Statement | None:
         """Wheels that do not turn as predicted, and a body that does not go as its wheels."""
-        went = {name: way for name, travel in self._travel.items() if (way := travel.way()) is not None}
+        went = {name: turned for name, travel in self._travel.items() if (turned := travel.turned()) is not None}
         if not went:
             return None
         if len(went) == 2:
@@ -116,13 +116,13 @@ class Guard:
             slips = np.flatnonzero(apart > SLIPS * np.maximum(far, 2.0 * self._judged))
             if slips.size:
                 return _stop("drive_slip", wheel=int(slips[0]) + 1)
-        way = next(iter(went.values()))
+        turned = next(iter(went.values()))
         row = round((self._travel[next(iter(went))].time - self.start) / self.program.dt)
         rows = np.arange(row - round(FOLLOWS_WITHIN / self.program.dt), row + 1)
         wanted = self._way(np.clip(rows, 0, len(self._predicted) - 1))
         one_way = np.abs(np.sign(wanted).sum(axis=0)) == len(rows)
         least = np.abs(wanted).min(axis=0) * np.sign(wanted[-1])
-        along = way * np.sign(least)
+        along = turned * np.sign(least)
         bad = np.flatnonzero(one_way & (np.abs(least) > self._judged) & (along < FOLLOWS * np.abs(least)))
         if not bad.size:
             return None
@@ -153,7 +153,7 @@ class _Travel:
         """Of the last angle."""
         return self._rows[-1][0]
 
-    def way(self) -> FloatArray | None:
+    def turned(self) -> FloatArray | None:
         """None while it was not watched that long."""
         if not self._rows or self._rows[-1][0] - self._rows[0][0] < 0.9 * WINDOW:
             return None

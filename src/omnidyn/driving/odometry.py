@@ -64,17 +64,23 @@ class Odometry:
             self._at_speed((pose - before)[:2], seconds)
         self.place, self._pose = np.array(pose), (t, np.array(pose))
 
-    def _moved(self, way: FloatArray, step: float) -> None:
-        """A way in the frame of the body."""
-        heading = self.place[2] + 0.5 * way[2]
+    def _moved(self, displacement: FloatArray, step: float) -> None:
+        """A displacement in the frame of the body."""
+        heading = self.place[2] + 0.5 * displacement[2]
         cosine, sine = np.cos(heading), np.sin(heading)
-        moved = np.array([cosine * way[0] - sine * way[1], sine * way[0] + cosine * way[1], way[2]])
+        moved = np.array(
+            [
+                cosine * displacement[0] - sine * displacement[1],
+                sine * displacement[0] + cosine * displacement[1],
+                displacement[2],
+            ]
+        )
         self.place = self.place + moved
         self._at_speed(moved[:2], step)
 
-    def _at_speed(self, way: FloatArray, seconds: float) -> None:
+    def _at_speed(self, displacement: FloatArray, seconds: float) -> None:
         """The speed, smoothed over SMOOTHED."""
-        self.speed = self.speed + (way - seconds * self.speed) / (SMOOTHED + seconds)
+        self.speed = self.speed + (displacement - seconds * self.speed) / (SMOOTHED + seconds)
 
 
 def _sum(total: FloatArray | None, more: FloatArray) -> FloatArray:

@@ -35,23 +35,23 @@ TURN_ONLY = 0.1  # [m] a rad: less way beside a turn is not named
 class Leg(NamedTuple):
     """One way from rest to rest.
 
-    first, end: its rows, the rest behind it included. way, farthest: from where it began, in the frame of the body
-    there (forward, left, counter-clockwise) [m, m, rad], to its end and to where it is farthest. pose: of its end, in
-    the room.
+    first, end: its rows, the rest behind it included. displacement, farthest: from where it began, in the frame of the
+    body there (forward, left, counter-clockwise) [m, m, rad], to its end and to where it is farthest. pose: of its
+    end, in the room.
     """
 
     first: int
     end: int
-    way: tuple[float, float, float]
+    displacement: tuple[float, float, float]
     farthest: tuple[float, float, float]
     pose: tuple[float, float, float]
 
     @property
     def words(self) -> str:
         """Where it leads, in words: "forward 0.52 m, left 0.10 m", "turn left 35 deg and back by 27 deg"."""
-        back = np.subtract(self.way, self.farthest).tolist()
+        back = np.subtract(self.displacement, self.farthest).tolist()
         if _size(back) < BACK * _size(self.farthest):
-            return in_words(self.way)
+            return in_words(self.displacement)
         return f"{in_words(self.farthest)}, then {in_words(back)}"
 
     @property
@@ -190,13 +190,13 @@ def _farthest(pose: FloatArray) -> tuple[float, float, float]:
     return way_between(pose[0], pose[int(np.argmax(far))])
 
 
-def _size(way: Sequence[float]) -> float:
-    return float(np.hypot(way[0], way[1]) + TURN_ONLY * abs(way[2]))
+def _size(displacement: Sequence[float]) -> float:
+    return float(np.hypot(*displacement[:2]) + TURN_ONLY * abs(displacement[2]))
 
 
-def in_words(way: Sequence[float]) -> str:
+def in_words(displacement: Sequence[float]) -> str:
     """A way in words, its largest part first."""
-    forward, left, turn = way
+    forward, left, turn = displacement
     far = np.hypot(forward, left) > TURN_ONLY * abs(turn)
     parts = [
         (abs(forward), f"{'forward' if forward > 0 else 'back'} {abs(forward):.2f} m", far and abs(forward) > STILL[0]),

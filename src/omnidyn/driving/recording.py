@@ -15,7 +15,7 @@ from omnidyn.sensors import CHANNELS, SCALAR
 TICK = 1e-6  # [s]: times that are nearer are one row
 
 
-class Recording:
+class DriveRecording:
     """Inputs and measurements of a drive, as they come."""
 
     def __init__(self) -> None:
@@ -72,6 +72,6 @@ def _column(name: str, values: list[tuple[int, FloatArray]], ticks: np.ndarray) 
 
 def _held(values: FloatArray) -> FloatArray:
     """Each value until the next one; the first one before it too."""
-    known = np.flatnonzero(np.isfinite(values))
-    places = np.maximum(np.searchsorted(known, np.arange(len(values)), side="right") - 1, 0)
-    return values[known[places]]
+    finite = np.flatnonzero(np.isfinite(values))
+    places = np.maximum(np.searchsorted(finite, np.arange(len(values)), side="right") - 1, 0)
+    return values[finite[places]]

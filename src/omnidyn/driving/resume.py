@@ -68,7 +68,7 @@ def driven_rows(program: DriveProgram, run: Run) -> FloatArray:
             expected=f"{program.channel} of {program.robot.wheels.count} wheels",
             where="resume",
         )
-    known = np.flatnonzero(np.isfinite(inputs).all(axis=1))
-    t, inputs = run.t[known] - run.t[known[0]], inputs[known]
+    complete = np.flatnonzero(np.isfinite(inputs).all(axis=1))
+    t, inputs = run.t[complete] - run.t[complete[0]], inputs[complete]
     rows = np.arange(round(t[-1] / program.dt)) * program.dt
     return inputs[np.searchsorted(t, rows + 1e-6, side="right") - 1]

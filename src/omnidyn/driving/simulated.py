@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.driving.clock import Clock, SimulatedClock
+from omnidyn.driving.clock import DriveClock, SimulatedClock
 from omnidyn.driving.connection import Command, Measured
 from omnidyn.driving.dead_man import DeadMan
 from omnidyn.identification.planning.recorded import noise_of
@@ -51,7 +51,6 @@ class SimulatedRobot:
         rate: Of what it measures [Hz].
         delay: Of the line, each way [s].
         faults: What goes wrong.
-        supply: Of its battery [V]; default: of its file. It is measured where there is one.
         seed: Of the noise.
     """
 
@@ -60,18 +59,17 @@ class SimulatedRobot:
         robot: Robot,
         noise: Mapping[str, Any] | None = None,
         *,
-        clock: Clock | None = None,
+        clock: DriveClock | None = None,
         rate: float = 100.0,
         delay: float = 0.0,
         faults: Sequence[Fault] = (),
-        supply: float | None = None,
         seed: int = 0,
     ) -> None:
         self.robot, self.clock, self.period = robot, clock or SimulatedClock(), 1.0 / rate
         self.noise = noise_of(robot, self.period, noise)
         self.delay, self.faults = delay, deque(sorted(faults, key=lambda fault: fault.at))
         self._rng = np.random.default_rng(seed)
-        self._supply = supply or robot.drive.supply or 0.0
+        self._supply = robot.drive.supply or 0.0  # measured where there is one
         self._sign, self._alive = np.ones(robot.wheels.count), np.ones(robot.wheels.count, bool)
         self._deaf = self._mute = self._halted = False
         self._silent_until, self._jump = -np.inf, 0.0

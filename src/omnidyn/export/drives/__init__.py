@@ -2,5 +2,5 @@
 
 kinds: which there are. rows: the program as a few straight pieces, and what its legs turn the wheels by. python_core,
 java_core, c_core: one class that walks them and stops, in three languages. arduino, ros2_drive, ftc, frc: what stands
-around it.
+around it. page: to print.
 """

@@ -18,7 +18,7 @@ ONE_WAY = 0.8  # of the way of a wheel in a leg: where it ends nearer, the leg i
 DEAD_MAN = 0.25  # [s]
 
 
-class Piece(NamedTuple):
+class StraightPiece(NamedTuple):
     """Rows on a straight line.
 
     rows: how many. first, step (wheels,): the input of the first one, and from row to row.
@@ -36,10 +36,10 @@ class LegData(NamedTuple):
     angle: tuple[float, ...]
 
 
-def pieces(inputs: FloatArray) -> list[Piece]:
+def pieces(inputs: FloatArray) -> list[StraightPiece]:
     """The fewest straight pieces from the left, that give every row. Inputs: shape (rows, wheels)."""
     nearest = ROUNDING * max(float(np.abs(inputs).max()), 1e-300)
-    found, k = list[Piece](), 0
+    found, k = list[StraightPiece](), 0
     while k < len(inputs):
         step = inputs[k + 1] - inputs[k] if k + 1 < len(inputs) else np.zeros(inputs.shape[1])
         line = inputs[k] + np.arange(len(inputs) - k)[:, None] * step
@@ -47,7 +47,7 @@ def pieces(inputs: FloatArray) -> list[Piece]:
         count = int(off[0]) if off.size else len(line)
         if count <= 2 and np.any(step):  # two rows lie on any line: a jump is none
             count, step = 1, np.zeros_like(step)
-        found.append(Piece(count, tuple(inputs[k].tolist()), tuple(step.tolist())))
+        found.append(StraightPiece(count, tuple(inputs[k].tolist()), tuple(step.tolist())))
         k += count
     return found
 
@@ -72,7 +72,7 @@ class Constants(NamedTuple):
     area: tuple[float, float]
     least_supply: float
     to_twist: tuple[tuple[float, ...], ...]
-    pieces: list[Piece]
+    pieces: list[StraightPiece]
     legs: list[LegData]
 
 

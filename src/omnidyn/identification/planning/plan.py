@@ -209,8 +209,8 @@ class _Planner:
         score = self._score(names, aim)
         begun = information[[candidates.index(move) for move in opening]].sum(axis=0)
         if self.driven is not None:
-            told, more = information_of([self._recorded(self.robot, self.driven, rng)], self.robot, asked)
-            places = [names.index(name) for name in told]  # a short drive tells nothing of some
+            told_names, more = information_of([self._recorded(self.robot, self.driven, rng)], self.robot, asked)
+            places = [names.index(name) for name in told_names]  # a short drive tells nothing of some
             begun[np.ix_(places, places)] += more[0]
         time = (1.0 - HELD_OUT_SHARE) * seconds - REST - sum(move.duration for move in opening)
         best, best_score = None, math.inf
