@@ -22,6 +22,7 @@ PLAIN_OPTIONS = (
     "fail_if",
     "force",
     "force_guess",
+    "free_base",
     "full",
     "hold",
     "horizon",
