@@ -40,6 +40,7 @@ FLOORS = (
     "comparison",
     "identification",
     "control",
+    "driving",
     "campaigns",
     "telling",
     "paper",

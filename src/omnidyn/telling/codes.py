@@ -38,6 +38,7 @@ ROOMS = (
     "steady",
     "lines",
     "live",
+    "driving",
 )
 
 
