@@ -190,7 +190,7 @@ def test_by_keyboard_from_two_logs_of_which_one_has_a_wrong_sign_to_a_robot_file
     press_on(page, "#fit")
     words = verdict(page, "#fit-verdict")
     with page.expect_download() as download:
-        press_on(page, "a[href='/fit/robot.toml']")
+        press_on(page, "a.robot-file")
     saved = omnidyn.load_robot(download.value.path().rename(tmp_path / "robot.toml"))
     assert "Failed" not in words
     said = command("identify", right, other, "--robot", "axebot", "--json")[0]

@@ -20,6 +20,7 @@ from omnidyn.studio.compare.job import compare, drift
 from omnidyn.studio.drive.job import drive
 from omnidyn.studio.fit.job import fit, free_keys, warm
 from omnidyn.studio.job import Tell
+from omnidyn.studio.live.job import watch
 from omnidyn.studio.log.job import align, check, example, save_columns
 from omnidyn.studio.robot.job import check_robot
 from omnidyn.studio.track.job import track
@@ -38,6 +39,7 @@ JOBS: dict[str, Callable[[Mapping[str, Any], Tell, Any], dict[str, Any]]] = {
     "track": track,
     "compare": compare,
     "drift": drift,
+    "watch": watch,
 }
 
 
