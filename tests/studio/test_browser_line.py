@@ -185,8 +185,11 @@ def test_by_keyboard_from_two_logs_of_which_one_has_a_wrong_sign_to_a_robot_file
     press_on(page, "#next-robot")
     page.wait_for_selector(".free .q-chip")
     page.get_by_text("wrong.csv: vy goes the other way than the voltages drive the robot").wait_for()
+    same = "document.querySelector(\"[aria-label='use of right.csv']\").same"
+    page.evaluate(f"{same} = true")
     press_on(page, "[aria-label='mend wrong.csv']")
     page.wait_for_function(said, arg="2 logs")
+    assert page.evaluate(same)  # a check that ends makes no choice anew: a click on it would be lost
     press_on(page, "#fit")
     words = verdict(page, "#fit-verdict")
     with page.expect_download() as download:

@@ -150,17 +150,17 @@ class Fitting:
             return "nothing_free", ""
         if len(self.held_out) == len(self.logs):
             return "all_held_out", ""
-        return self._why_no_groups(), ""
+        return self._why_no_groups()
 
-    def _why_no_groups(self) -> str:
-        """What keeps from a fit of these groups: a code, "" for nothing."""
+    def _why_no_groups(self) -> tuple[str, str]:
+        """What keeps from a fit of these groups, as `why_not` has it."""
         groups, held_out = self.groups, self.held_out
-        if not all(groups.values()):
-            return "no_group"
+        if without := [key for key, group in groups.items() if not group]:
+            return "no_group", self.session.logs[without[0]].label
         fitted = {group for key, group in groups.items() if key not in held_out}
         if len(fitted) == 1:
-            return "one_group"
-        return "group_held_out" if {*groups.values()} - fitted else ""
+            return "one_group", ""
+        return ("group_held_out", "") if {*groups.values()} - fitted else ("", "")
 
     async def run(self, added: str = "") -> None:
         """Fit the robot to the logs. added: a number that is free beside the others."""

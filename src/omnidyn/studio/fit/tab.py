@@ -22,10 +22,10 @@ from omnidyn.studio.task import Task
 WHY = {
     "no_log": "Add a log first: tab Log.",
     "no_robot": "Choose a robot first.",
-    "checking": "The log is being checked.",
+    "checking": "{} is being checked.",
     "nothing_free": "Nothing is free: choose what to fit.",
     "all_held_out": "No log is fitted: choose one to fit.",
-    "no_group": "A log has no group: name one for each log, or for none.",
+    "no_group": "{} has no group: name one for each log, or for none.",
     "one_group": "The logs that are fitted are all of one group: name another one, or none.",
     "group_held_out": "A group has only logs that are held out: choose one to fit, or name another group.",
 }
@@ -41,7 +41,8 @@ class FitTab:
         """Lay it out."""
         self.page.empty("Fit")
         self.page.part(self.page.robot_choice, ROBOT, of=self.page.robots)
-        self.page.part(self._uses, LOGS, of=self._usable)
+        self.page.part(self._uses, LOGS, of=self._labels)  # a check that ends takes no click and no text away
+        self.page.part(self._unusable, LOGS, of=self._not_usable)
         self.page.part(self._remedies, LOGS, FIT, of=self._wrong)
         self.page.part(self._free, FREE, ROBOT)
         self.page.part(self._start, FIT, LOGS, of=self._ready)
@@ -54,29 +55,37 @@ class FitTab:
         if len(self.session.logs) < 2:
             return
         with ui.element("div").classes("robots"):
-            for key, log in self.session.logs.items():
+            for key, label in self._labels().items():
                 with ui.row().classes("line entry"):
-                    ui.label(log.label).classes("use")
+                    ui.label(label).classes("use")
                     use = ui.toggle(
                         [FITTED, HELD_OUT, LEFT_OUT], value=self.fitting.use_of(key), on_change=self._use(key)
                     )
-                    use.props(f"no-caps dense unelevated aria-label='use of {log.label}'")
+                    use.props(f"no-caps dense unelevated aria-label='use of {label}'")
                     self.page.mirror(use, FIT, partial(self.fitting.use_of, key), key)
                     group = ui.input(value=self.fitting.group_of(key), placeholder="group, such as carpet")
-                    group.props(f"dense maxlength={MAX_GROUP} aria-label='group of {log.label}'").classes("group")
+                    group.props(f"dense maxlength={MAX_GROUP} aria-label='group of {label}'").classes("group")
                     group.on("change", self._name_group(key, group))
                     self.page.mirror(group, FIT, partial(self.fitting.group_of, key), f"group of {key}")
-                    if not self._usable()[key][1]:
-                        ui.label("not usable as it is: leave it out, or mend it on the tab Log").classes("error-text")
         ui.label(
             "What is held out is predicted, not fitted: that shows what the model is worth. "
             "Logs of several floors or loads: name a group for each log, and each group gets friction of its own."
         ).classes("text quiet")
 
-    def _usable(self) -> dict[str, tuple[str, bool]]:
-        """Key of each log -> its label, and whether it can be used as it is."""
-        logs = self.session.logs.items()
-        return {key: (log.label, not log.error and not (log.result and log.result["has_errors"])) for key, log in logs}
+    def _labels(self) -> dict[str, str]:
+        """Key of each log -> its label."""
+        return {key: log.label for key, log in self.session.logs.items()}
+
+    def _not_usable(self) -> list[str]:
+        """Labels of logs that cannot be used as they are."""
+        logs = self.session.logs.values()
+        return [log.label for log in logs if log.error or (log.result and log.result["has_errors"])]
+
+    def _unusable(self) -> None:
+        """Which logs cannot be used as they are, and what to do."""
+        if len(self.session.logs) > 1 and (labels := self._not_usable()):
+            words = f"Not usable: {', '.join(labels)}. Leave it out, or mend it on the tab Log."
+            ui.label(words).classes("text error-text")
 
     def _use(self, key: str) -> Callable[[Any], None]:
         """What takes the use of a log."""
@@ -120,7 +129,7 @@ class FitTab:
             )
             button.set_enabled(not code and not running)
             if code:
-                ui.label(words if code in ("unfit", "unread") else WHY[code]).classes("text quiet").props("id=why")
+                ui.label(words if code in ("unfit", "unread") else WHY[code].format(words)).classes("text quiet").props("id=why")
             elif not running:
                 ui.label(fitted).classes("text quiet")
 
