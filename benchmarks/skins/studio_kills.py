@@ -89,6 +89,7 @@ def _jobs(studio: Studio) -> list[Job]:
     """A job of each worker."""
     session, (log,) = studio.session, studio.session.logs.values()
     fitting, tracks, comparing, driving = studio.fitting, studio.tracks, studio.comparing, studio.driving
+    watching = studio.watching
 
     async def drive() -> None:
         """A drive of half a second."""
@@ -98,6 +99,14 @@ def _jobs(studio: Studio) -> list[Job]:
         driving.send({"stop": True})
         await task
 
+    async def watch() -> None:
+        """Watch the log for half a second."""
+        task = asyncio.ensure_future(watching.run(log))
+        await _until(lambda: task.done() or watching.status is not None)
+        await asyncio.sleep(0.5)
+        watching.stop()
+        await task
+
     of_tasks = (("fit", fitting), ("track", tracks), ("compare", comparing))
     return [
         Job("log", lambda: session.check(log), lambda: log.ended, lambda: log.result is not None),
@@ -105,6 +114,7 @@ def _jobs(studio: Studio) -> list[Job]:
             Job(name, tab.run, lambda tab=tab: tab.last.stopped, lambda tab=tab: tab.last.result is not None)
             for name, tab in of_tasks
         ),
+        Job("watch", watch, lambda: bool(watching.trouble), lambda: bool(watching.status) and not watching.trouble),
         Job("drive", drive, lambda: bool(driving.trouble), lambda: not driving.trouble),
     ]
 
