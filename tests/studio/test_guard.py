@@ -139,6 +139,13 @@ def test_only_what_belongs_to_the_page_is_served(studio):
     assert "https://" not in text.partition("<body")[0]
 
 
+def test_a_page_that_answers_late_on_a_busy_machine_is_not_loaded_anew(studio):
+    """It would lose what is typed and open: the default of the server gives a page 2 s to answer, and 3 s more."""
+    status, text = ask(studio.port, POLLING, Origin=f"http://127.0.0.1:{studio.port}")
+    assert status == 200
+    assert json.loads(text.rpartition("\r\n\r\n")[2].partition("0")[2])["pingTimeout"] >= 10_000
+
+
 def test_a_large_request_is_refused(studio):
     mine = f"http://127.0.0.1:{studio.port}"
     status, _ = ask(studio.port, f"{POLLING}&sid=x", "POST", b"x" * 1_100_000, Origin=mine)

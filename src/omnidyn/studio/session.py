@@ -10,7 +10,6 @@ import asyncio
 import contextlib
 import inspect
 import itertools
-import re
 import shutil
 import tempfile
 from collections.abc import AsyncIterator, Callable
@@ -25,7 +24,7 @@ from omnidyn.studio.calls import LogFile, safe_name
 from omnidyn.studio.parts import COMPARE, FIT, LOGS, PROGRESS, ROBOT, TRACK, WATCH
 from omnidyn.studio.removed import Removed
 from omnidyn.studio.series import META, Series
-from omnidyn.studio.words import each_text, in_page_names
+from omnidyn.studio.words import each_text, in_page_names, without_folders
 from omnidyn.studio.worker import CancelledError, EndedError, JobError, Worker
 
 MAX_FILES, MAX_FILE_BYTES, MAX_BYTES = 50, 2**30, 4 * 2**30  # of uploads
@@ -176,11 +175,7 @@ class Session:
 
     def without_folders(self, words: str) -> str:
         """Words without folders of uploads, of results, and of files that the command line named."""
-        words = re.sub(rf"{re.escape(str(self.folder))}/(?:\d+/)+", "", words)
-        for path in (*(log.path for log in self.logs.values()), *self.robots.values()):
-            for name in (path, str(Path(path).absolute())):
-                words = words.replace(name, Path(path).name)
-        return words
+        return without_folders(words, self.folder, [log.path for log in self.logs.values()] + [*self.robots.values()])
 
     def remove(self, log: LogFile) -> None:
         """Take a log away; one that was uploaded is deleted when something else is removed, and can be brought back."""

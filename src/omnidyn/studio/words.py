@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 from omnidyn.logs.column import MOTOR_SIDE
@@ -48,6 +49,15 @@ def in_page_names(text: str) -> str:
     named = _NESTED.sub(r"(\1, \2)", _OPTION.sub(_of_page, named))
     named = _LATENCY.sub(_of_channel, _TWIST.sub(lambda match: AXES[int(match[1])], named))
     return _TWICE.sub(r"\1", _KEY.sub(lambda match: in_words(match[0]), named))
+
+
+def without_folders(text: str, folder: Path, paths: Iterable[str]) -> str:
+    """A text without the numbered folders of a folder, and with the name alone of each of these files."""
+    text = re.sub(rf"{re.escape(str(folder))}/(?:\d+/)+", "", text)
+    for path in paths:
+        for name in (path, str(Path(path).absolute())):
+            text = text.replace(name, Path(path).name)
+    return text
 
 
 def number_in_words(name: str) -> str:

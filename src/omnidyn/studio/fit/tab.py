@@ -129,7 +129,9 @@ class FitTab:
             )
             button.set_enabled(not code and not running)
             if code:
-                ui.label(words if code in ("unfit", "unread") else WHY[code].format(words)).classes("text quiet").props("id=why")
+                ui.label(words if code in ("unfit", "unread") else WHY[code].format(words)).classes("text quiet").props(
+                    "id=why"
+                )
             elif not running:
                 ui.label(fitted).classes("text quiet")
 

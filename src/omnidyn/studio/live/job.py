@@ -23,7 +23,7 @@ def watch(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, An
     robot = robot_of(request)
     assert robot is not None
     live, table = Live(robot, within=request["within"]), GrowingTable(request["name"], robot, options_of(request))
-    told = 0.0
+    last = 0.0
     tell("live", shown(live.status))
     for data in growth_of(request["path"]):
         if not commands.empty():
@@ -33,8 +33,8 @@ def watch(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, An
             continue
         for run in table.feed(data.decode("utf-8", errors="replace")):
             for status in live.answers(run):
-                if time.monotonic() - told > INTERVAL:
-                    told = time.monotonic()
+                if time.monotonic() - last > INTERVAL:
+                    last = time.monotonic()
                     tell("live", shown(status))
             tell("live", shown(live.status))
     return shown(live.status)
