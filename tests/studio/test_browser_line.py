@@ -5,6 +5,7 @@ import signal
 import subprocess
 
 import omnidyn
+from omnidyn.document import sentence
 from omnidyn.model.keys import Key, find_key
 from tests.support.pages import choose_axebot, command, drop, laid_out, load_again, numbers, shown, tab, verdict
 from tests.support.pages import write_log as written
@@ -153,6 +154,33 @@ def test_robots_are_seen_edited_renamed_and_removed_and_a_map_is_none(browser, t
     page.get_by_label("Remove heavier.toml").click()
     page.wait_for_function("!document.querySelector('.panels').innerText.includes('heavier.toml')")
     assert states(page)["Robot"] == ("○", "none chosen")
+
+
+def test_a_log_that_grows_is_watched(browser, tmp_path):
+    rows = written(tmp_path / "whole.csv", 20.0).read_text("utf-8").splitlines(keepends=True)
+    path = tmp_path / "log.csv"
+    path.write_text("".join(rows[:900]), "utf-8")
+    _, page = browser.start(path)
+    verdict(page)
+    assert page.is_disabled("#watch")
+    choose_axebot(page)
+    tab(page, "Log")
+    page.click("#watch:not([disabled])")
+    page.wait_for_selector(".meter")
+    with path.open("a", encoding="utf-8") as file:
+        file.write("".join(rows[900:]))
+    live = omnidyn.Live(omnidyn.load_robot("axebot")).add(omnidyn.read_log(path))
+    said = laid_out(f"log.csv: {sentence(str(live.verdict))}")
+    same = "words => document.querySelector('#live-verdict')?.innerText.includes(words)"
+    page.wait_for_function(same, arg=said.splitlines()[0])
+    assert verdict(page, "#live-verdict") == said
+    known = [number.is_reached for number in live.numbers.values() if number.within]
+    assert page.locator(".meter").count() == len(known)
+    assert page.locator(".meter .reached").count() == sum(known)
+    shown(page, "live")
+    page.click("#stop-watching")
+    page.get_by_text("The same by hand (watch)").click()
+    assert page.inner_text("#call-watch") == f"omnidyn watch {path} --robot axebot --within 10"
 
 
 def press_on(page, selector):

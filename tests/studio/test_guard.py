@@ -143,7 +143,7 @@ def test_a_page_that_answers_late_on_a_busy_machine_is_not_loaded_anew(studio):
     """It would lose what is typed and open: the default of the server gives a page 2 s to answer, and 3 s more."""
     status, text = ask(studio.port, POLLING, Origin=f"http://127.0.0.1:{studio.port}")
     assert status == 200
-    assert json.loads(text.rpartition("\r\n\r\n")[2].partition("0")[2])["pingTimeout"] >= 10_000
+    assert int(text.partition('"pingTimeout":')[2].partition(",")[0].strip("} ")) >= 10_000  # [ms]
 
 
 def test_a_large_request_is_refused(studio):

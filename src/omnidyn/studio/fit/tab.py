@@ -42,7 +42,7 @@ class FitTab:
         self.page.empty("Fit")
         self.page.part(self.page.robot_choice, ROBOT, of=self.page.robots)
         self.page.part(self._uses, LOGS, of=self._labels)  # a check that ends takes no click and no text away
-        self.page.part(self._unusable, LOGS, of=self._not_usable)
+        self.page.part(self._unusable, LOGS, FIT, of=self._not_usable)
         self.page.part(self._remedies, LOGS, FIT, of=self._wrong)
         self.page.part(self._free, FREE, ROBOT)
         self.page.part(self._start, FIT, LOGS, of=self._ready)
@@ -77,9 +77,10 @@ class FitTab:
         return {key: log.label for key, log in self.session.logs.items()}
 
     def _not_usable(self) -> list[str]:
-        """Labels of logs that cannot be used as they are."""
-        logs = self.session.logs.values()
-        return [log.label for log in logs if log.error or (log.result and log.result["has_errors"])]
+        """Labels of logs that cannot be used as they are, and that no button mends."""
+        mended = [log for log, _ in self._wrong()]
+        bad = [log for log in self.session.logs.values() if log.error or (log.result and log.result["has_errors"])]
+        return [log.label for log in bad if log not in mended]
 
     def _unusable(self) -> None:
         """Which logs cannot be used as they are, and what to do."""
