@@ -52,7 +52,10 @@ def main() -> None:
     working = threading.Event()
 
     def tell(kind: str, value: Any) -> None:
-        out.write(json.dumps({kind: value}).encode() + b"\n")
+        try:
+            out.write(json.dumps({kind: value}).encode() + b"\n")
+        except BrokenPipeError:  # the server is gone: nobody waits for the job
+            os._exit(0)
 
     def read() -> None:
         for line in sys.stdin.buffer:
