@@ -100,6 +100,11 @@ def test_what_is_no_text_is_said_and_stop_ends_it_with_the_log_checked_anew(tmp_
             await finished(lambda: log.result is not None)
             assert log.result["rows"] == 299
             task = asyncio.ensure_future(watching.run(log))
+            await finished(lambda: session.workers["watch"].busy)
+            watching.stop()  # before its process can hear it
+            await asyncio.wait_for(task, 120)
+            assert watching.trouble == ""
+            task = asyncio.ensure_future(watching.run(log))
             await finished(lambda: works(session.workers["watch"]) and watching.status is not None)
             with path.open("a", encoding="utf-8") as file:
                 file.write("".join(text[300:]))
