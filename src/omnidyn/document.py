@@ -19,6 +19,7 @@ WIDTH = 100  # columns of text that knows no terminal
 GAP = "  "  # between two columns of a table
 TINY_CHANCE = 0.001
 VERDICT_WORDS = 25  # of a line
+NAME_WORDS = 2  # at most, of what a verdict is about
 MOST_DIGITS = 6  # of two numbers that are nearly alike
 MOST_WHOLE = 1e6  # from which on an exponent reads better
 
@@ -153,12 +154,15 @@ def in_clauses(words: str, most: int = VERDICT_WORDS) -> tuple[str, list[str]]:
     """(the first clauses with at most so many words, a sentence; the other clauses): how a long verdict is laid out.
 
     A clause ends at a semicolon or with its sentence, outside of brackets; a first one that is too long at a colon or
-    before "but" too.
+    before "but" too, or at a comma where a name alone stands before the colon.
     """
     first, *others = _cut(words, r"(?<=;) |(?<=\.) (?=[A-Z])")
     if len(first.split()) > most:
         parts = _cut(first, r"(?<=:) |(?<=,) (?=but )")
         count = _fitting(parts, most)
+        if len(" ".join(parts[:count]).split()) <= NAME_WORDS:
+            parts = _cut(first, r"(?<=,) ")
+            count = _fitting(parts, most)
         first, others = " ".join(parts[:count]), [*([" ".join(parts[count:])] if parts[count:] else []), *others]
     else:
         count = _fitting([first, *others], most)
