@@ -7,7 +7,7 @@ import pytest
 
 import omnidyn
 from omnidyn.control.pose_estimator import BY_TURN, TURN_BY_TIME, estimator_numbers
-from omnidyn.identification.output_error.sensors_of_logs import _gyroscope, has_gyroscope
+from omnidyn.identification.output_error.sensors_of_logs import _gyroscope, _is_possible, _poses, has_gyroscope
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
 
 AXEBOT = omnidyn.load_robot("axebot")
@@ -81,3 +81,31 @@ def test_a_twist_of_all_axes_is_no_gyroscope():
     whole = replace(run, twist=np.column_stack([np.full((len(run), 2), 0.1), run.twist[:, 2]]))
     assert has_gyroscope(run)
     assert not has_gyroscope(whole)
+
+
+def camera_log(is_staggered: bool):
+    """10 s of noisy poses: in every third row of a logger beside speeds, or in rows of their own, 1 us behind those."""
+    rng, count = np.random.default_rng(2), 1000
+    poses = np.cumsum(0.002 * np.ones((count, 3)), axis=0) + 1e-3 * rng.standard_normal((count, 3))
+    t, speeds = DT * np.arange(count), np.ones((count, 3))
+    if not is_staggered:
+        poses[np.arange(count) % 3 != 0] = np.nan
+        return omnidyn.Run(t=t, voltage=speeds, wheel_speed=speeds, pose=poses)
+    t, nothing = np.sort(np.append(t, t + 1e-6)), np.full((2 * count, 3), np.nan)
+    both = {"wheel_speed": nothing.copy(), "pose": nothing.copy()}
+    both["wheel_speed"][::2], both["pose"][1::2] = speeds, poses
+    return omnidyn.Run(t=t, voltage=np.ones((2 * count, 3)), **both)
+
+
+def test_poses_with_times_of_their_own_waited_for_no_row():
+    """The row of a staggered log is the time from one sensor to the next: 1 us here, which no file holds."""
+    assert _poses([camera_log(is_staggered=False)])["row"] == pytest.approx(DT)
+    shown = _poses([camera_log(is_staggered=True)])
+    assert "row" not in shown
+    assert shown["pose_rate"] == pytest.approx(1.0 / DT)
+
+
+def test_what_no_file_can_hold_is_left_out():
+    assert _is_possible("pose_rate", 30.0)
+    assert not _is_possible("pose_rate", 0.05)
+    assert not _is_possible("row", 1e-6)

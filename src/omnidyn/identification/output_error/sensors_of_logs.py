@@ -6,11 +6,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import usual_step
+from omnidyn.errors import InputError
 from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.wheels import Wheels, twist_from_wheel_speed
 from omnidyn.run import Run
+from omnidyn.sensors import SENSORS
 from omnidyn.statistics import robust_std
 
 LEAST_POSES, LEAST_NOISE = 50, 1e-4  # [1], [m] std: poses with less are counted, or of a simulation
@@ -25,7 +28,17 @@ MOST_ALIKE = 0.98  # correlation of the heading with the time, beyond which a bi
 def sensors_shown(records: Sequence[Record], wheels: Wheels, noise: Mapping[str, float]) -> dict[str, float]:
     """Fields of `LogEffects` that the logs show. noise: std of what a fit leaves of each column."""
     runs = [record.run for record in records if record.run is not None]
-    return _poses(runs) | _counts(records) | _gyroscope(runs, wheels, noise.get("twist[2]"))
+    shown = _poses(runs) | _counts(records) | _gyroscope(runs, wheels, noise.get("twist[2]"))
+    return {name: value for name, value in shown.items() if _is_possible(name, value)}
+
+
+def _is_possible(name: str, value: float) -> bool:
+    """Whether a file can hold it: a sensor beyond that, such as a pose each 20 s, is none that a controller has."""
+    try:
+        LogEffects().replace(**{name: value})
+    except InputError:
+        return False
+    return True
 
 
 def _poses(runs: Sequence[Run]) -> dict[str, float]:
@@ -39,7 +52,8 @@ def _poses(runs: Sequence[Run]) -> dict[str, float]:
         is_new = np.append(True, (np.diff(poses, axis=0) != 0.0).any(axis=1))[: len(t)]
         t, poses = t[is_new], poses[is_new]
         seconds.append(np.diff(t))
-        rows_apart.append(usual_step(run.t))
+        if not _is_stamped(run, np.asarray(rows)):
+            rows_apart.append(usual_step(run.t))
         thirds.append(np.diff(np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])]), n=3, axis=0))
     if sum(map(len, thirds)) < LEAST_POSES:
         return {}
@@ -52,8 +66,16 @@ def _poses(runs: Sequence[Run]) -> dict[str, float]:
         "pose_rate": float(1.0 / np.mean(steps[steps <= LONGEST_STEP * np.median(steps)])),
         "pose_noise": place,
         "heading_noise": float(std[2]),
-        "row": float(np.median(rows_apart)),
-    }
+    } | ({"row": float(np.median(rows_apart))} if rows_apart else {})
+
+
+def _is_stamped(run: Run, rows: BoolArray) -> bool:
+    """Whether poses have times of their own, and waited for no row: other sensors are there, and in none of their rows.
+
+    rows: those with a pose, shape (n,).
+    """
+    others = [values for name in SENSORS if name != "pose" and (values := getattr(run, name)) is not None]
+    return bool(others) and not any(np.isfinite(values[rows]).any() for values in others)
 
 
 def _counts(records: Sequence[Record]) -> dict[str, float]:
@@ -99,11 +121,11 @@ def _bias(t: FloatArray, omega: FloatArray, run: Run, wheels: Wheels) -> list[fl
     Added up, it is the heading by wheels or poses, times a share that may be off as the size of the robot may, and the
     bias times the time.
     """
-    reference = _heading(run, wheels)
-    if reference is None:
+    heading_by_time = _heading(run, wheels)
+    if heading_by_time is None:
         return []
     turned = np.append(0.0, np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t)))
-    since, heading = t - t[0], np.interp(t, *reference)
+    since, heading = t - t[0], np.interp(t, *heading_by_time)
     if np.std(heading) > 0.0 and abs(np.corrcoef(since, heading)[0, 1]) > MOST_ALIKE:
         return []
     columns = np.column_stack([since, heading, np.ones(len(t))])
