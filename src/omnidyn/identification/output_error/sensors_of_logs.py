@@ -121,11 +121,11 @@ def _bias(t: FloatArray, omega: FloatArray, run: Run, wheels: Wheels) -> list[fl
     Added up, it is the heading by wheels or poses, times a share that may be off as the size of the robot may, and the
     bias times the time.
     """
-    known = _heading(run, wheels)
-    if known is None:
+    heading_by_time = _heading(run, wheels)
+    if heading_by_time is None:
         return []
     turned = np.append(0.0, np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t)))
-    since, heading = t - t[0], np.interp(t, *known)
+    since, heading = t - t[0], np.interp(t, *heading_by_time)
     if np.std(heading) > 0.0 and abs(np.corrcoef(since, heading)[0, 1]) > MOST_ALIKE:
         return []
     columns = np.column_stack([since, heading, np.ones(len(t))])
