@@ -100,3 +100,27 @@ def test_a_long_text_is_no_unit_and_soon_known_for_none():
 def test_any_text_is_a_unit_or_refused(text):
     unit = known_unit(text)
     assert unit is None or (unit.size > 0.0 and math.isfinite(unit.size))
+
+
+DEFINED = {  # what one of each is in SI; mutants of the table survived where only some of its names were tried
+    1.0: "s V volt volts A amp amps m m/s rad rad/s ticks tick counts count pulses pulse cts N W Nm kg m/s2 rad/s2",
+    1e-3: "ms mV mA mm mm/s mrad mrad/s mN mW mNm g",
+    1e-2: "cV cm cm/s percent",
+    1e3: "km kN kW",
+    0.1: "dV",
+    60.0: "min",
+    3600.0: "h Ah",
+    3.6: "mAh",
+    1e-6: "us",
+    1e-9: "ns",
+    0.0254: "inch",
+    0.3048: "ft",
+    math.pi / 180: "deg dps",
+    2 * math.pi: "rev turn turns rot rev/s turn/s rps Hz",
+    2 * math.pi / 60: "rev/min rot/min",
+}
+
+
+@pytest.mark.parametrize("text, one", [(text, one) for one, names in DEFINED.items() for text in names.split()])
+def test_one_of_each_name_is_its_definition(text, one):
+    assert parse_unit(text).size == pytest.approx(one, rel=1e-15)
