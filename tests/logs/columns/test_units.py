@@ -103,7 +103,8 @@ def test_any_text_is_a_unit_or_refused(text):
 
 
 DEFINED = {  # what one of each is in SI; mutants of the table survived where only some of its names were tried
-    1.0: "s V volt volts A amp amps m m/s rad rad/s ticks tick counts count pulses pulse cts N W Nm kg m/s2 rad/s2",
+    1.0: "duty "
+    "s V volt volts A amp amps m m/s rad rad/s ticks tick counts count pulses pulse cts N W Nm kg m/s2 rad/s2",
     1e-3: "ms mV mA mm mm/s mrad mrad/s mN mW mNm g",
     1e-2: "cV cm cm/s percent",
     1e3: "km kN kW",
