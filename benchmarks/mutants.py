@@ -35,7 +35,11 @@ class Room(NamedTuple):
 ROOMS = {
     "units": Room(("units.py",), ("tests/logs/columns/test_units.py",)),
     "selection": Room(("identification/selection",), ("tests/identification/selection",)),
-    "exact step": Room(("simulation/exact/step.py",), ("tests/laws/test_exact_step.py",), plain=True),
+    "exact step": Room(
+        ("simulation/exact/step.py",),
+        ("tests/laws/test_exact_step.py", "tests/simulation/exact/test_slopes.py"),
+        plain=True,
+    ),
     "friction": Room(("model/friction",), ("tests/model/friction",), plain=True),
     "readers": Room(("logs/table",), ("tests/logs/table",)),
 }
