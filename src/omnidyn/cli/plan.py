@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -34,7 +34,16 @@ def plan(
     ),
     area: str = typer.Option("3x3", metavar="XxY", help="Free floor [m]; it begins in the middle, along x."),
     time: float = typer.Option(60.0, metavar="S", help="Of all of it [s]."),
-    for_: str = typer.Option("", "--for", metavar="KEY", help="The number to learn best; default: all of them."),
+    for_: str = typer.Option(
+        "",
+        "--for",
+        metavar="KEY",
+        help="The number to learn best; A for the sum of all squared errors, ONE,OTHER for two explanations; default: "
+        "the volume of all intervals.",
+    ),
+    next_: bool = typer.Option(
+        False, "--next", help="ROBOT is a fit: plan the next drive, for the widest of its intervals."
+    ),
     free: Annotated[
         list[str] | None,
         typer.Option("--free", metavar="KEY", help="What is to be learnt; default: as identify. Repeatable."),
@@ -45,6 +54,14 @@ def plan(
             "--noise",
             metavar="CH=STD",
             help="What is logged, and its std: wheel_speed=0.05, twist=0.02,0.02,0.1. Repeatable. Default: [sensors].",
+        ),
+    ] = None,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            metavar="NAME=VALUE",
+            help="current=A of all motors together, heat=W of the hottest, traction=SHARE of the load. Repeatable.",
         ),
     ] = None,
     rate: float = typer.Option(100.0, metavar="HZ", help="Of commands and of the log."),
@@ -62,10 +79,23 @@ def plan(
         check_output(path, force)
     refuse_picture(picture, force)
     keep_inputs([], [robot], [], *files, picture)
-    sizes, stds = _sizes(area), _noise(noise or [])
+    sizes, stds = _sizes(area), _named_numbers("--noise", noise, "such as twist=0.02,0.02,0.1")
+    limits = _named_numbers("--limit", limit, "such as current=10")
+    if next_ and for_:
+        raise InputError("both --next and --for", expected="one of them: --next is for the widest interval of a fit")
     loaded, source = omnidyn.load_robot(robot), robot_input(robot)
     with shown_progress("planning") as progress:
-        made = omnidyn.plan(loaded, sizes, time, free=free, aim=for_, noise=stds, rate=rate, progress=progress)
+        made = omnidyn.plan(
+            loaded,
+            sizes,
+            time,
+            free=free,
+            aim="next" if next_ else for_,
+            noise=stds,
+            limits=limits,
+            rate=rate,
+            progress=progress,
+        )
     if out:
         for path, held_out in zip(files, (False, True), strict=False):
             _write(made, held_out, path, force)
@@ -99,12 +129,13 @@ def _sizes(area: str) -> tuple[float, ...]:
         raise InputError("not the size of a room", got=area, expected="such as 3x3", where="--area") from None
 
 
-def _noise(given: list[str]) -> dict[str, tuple[float, ...] | float] | None:
-    stds: dict[str, tuple[float, ...] | float] = {}
-    for text in given:
-        channel, sign, numbers = text.partition("=")
+def _named_numbers(flag: str, given: list[str] | None, example: str) -> dict[str, Any] | None:
+    """Name -> number, or numbers; None where nothing is given."""
+    values_by_name: dict[str, Any] = {}
+    for text in given or []:
+        name, sign, numbers = text.partition("=")
         if not sign:
-            raise InputError("not CHANNEL=STD", got=text, expected="such as twist=0.02,0.02,0.1", where="--noise")
-        values = tuple(number_list("--noise", numbers))
-        stds[channel] = values[0] if len(values) == 1 else values
-    return stds or None
+            raise InputError("not NAME=NUMBER", got=text, expected=example, where=flag)
+        values = tuple(number_list(flag, numbers))
+        values_by_name[name] = values[0] if len(values) == 1 else values
+    return values_by_name or None
