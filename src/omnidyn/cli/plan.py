@@ -20,6 +20,7 @@ from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
 
 if TYPE_CHECKING:
+    from omnidyn.document import Document
     from omnidyn.identification.planning.planned import Plan
 
 
@@ -56,6 +57,9 @@ def plan(
             help="What is logged, and its std: wheel_speed=0.05, twist=0.02,0.02,0.1. Repeatable. Default: [sensors].",
         ),
     ] = None,
+    rig: bool = typer.Option(
+        False, "--rig", help="One motor of ROBOT on a bench: first motion and stop both ways, gain, lag, offset, curve."
+    ),
     limit: Annotated[
         list[str] | None,
         typer.Option(
@@ -74,7 +78,7 @@ def plan(
     A program of moves, from rest to rest, that stay inside a room, and how well each number will be known after it.
     Drive it, log it, and give the log to identify.
     """
-    files = [out, _check_file(out), str(Path(out).with_suffix(".json"))] if out else []
+    files = [out, *([] if rig else [_check_file(out)]), str(Path(out).with_suffix(".json"))] if out else []
     for path in files:
         check_output(path, force)
     refuse_picture(picture, force)
@@ -84,6 +88,19 @@ def plan(
     if next_ and for_:
         raise InputError("both --next and --for", expected="one of them: --next is for the widest interval of a fit")
     loaded, source = omnidyn.load_robot(robot), robot_input(robot)
+    if rig:
+        unused = {"--for": for_, "--next": next_, "--free": free, "--limit": limit, "--picture": picture}
+        if given := [flag for flag, value in unused.items() if value]:
+            raise InputError(f"{given[0]} is for a whole robot, --rig for one motor", expected="one of them")
+        with shown_progress("planning") as progress:
+            of_motor = omnidyn.plan_rig(loaded, time, noise=stds, rate=rate, progress=progress)
+        if out:
+            omnidyn.write_run(of_motor.commands(), out, force=force)
+            _promise(of_motor.document(), source, out, force)
+        tell(of_motor.document(), json, provenance([source]), output=out or None)
+        if not json:
+            _say_files(files)
+        return
     with shown_progress("planning") as progress:
         made = omnidyn.plan(
             loaded,
@@ -99,17 +116,24 @@ def plan(
     if out:
         for path, held_out in zip(files, (False, True), strict=False):
             _write(made, held_out, path, force)
-        promised = as_json(
-            made.document(), provenance([source]), program_sha256=sha256(Path(out).read_bytes()).hexdigest()
-        )
-        write_atomic(files[-1], to_json(promised) + "\n", force)
+        _promise(made.document(), source, out, force)
     tell(made.document(), json, provenance([source]), output=out or None)
     if picture:
         from omnidyn.report.figures.plan import draw_plan
 
         write_picture(draw_plan(made), picture, force)
     if not json:
-        say(f"omnidyn: wrote {', '.join(files)}" if out else "omnidyn: nothing written; -o FILE writes the program")
+        _say_files(files)
+
+
+def _say_files(files: list[str]) -> None:
+    say(f"omnidyn: wrote {', '.join(files)}" if files else "omnidyn: nothing written; -o FILE writes the program")
+
+
+def _promise(document: Document, source: dict[str, str], out: str, force: bool) -> None:
+    """Write what a plan promises beside its program, with the hash of that."""
+    promised = as_json(document, provenance([source]), program_sha256=sha256(Path(out).read_bytes()).hexdigest())
+    write_atomic(str(Path(out).with_suffix(".json")), to_json(promised) + "\n", force)
 
 
 def _check_file(out: str) -> str:

@@ -60,6 +60,20 @@ def _planned(statement: Statement) -> str:
     return f"{words}; not {names_of(missing)}" if missing else words
 
 
+def _planned_rig(statement: Statement) -> str:
+    """ "60 s on the bench tell all 9 numbers of a motor of axebot, the widest (first motion backward) within 4 %" """
+    numbers = statement.numbers
+    begin = f"{numbers['seconds']:.3g} s on the bench tell"
+    if not numbers["told"]:
+        return f"{begin} no number of a motor of {statement.subject}"
+    share = "all" if not numbers["missing"] else f"{numbers['told']} of"
+    words = (
+        f"{begin} {share} {numbers['count']} numbers of a motor of {statement.subject}, the widest "
+        f"({numbers['widest']}) within {_within(numbers['share'])}"
+    )
+    return f"{words}; not {all_of([*numbers['missing']])}" if numbers["missing"] else words
+
+
 def _planned_next(statement: Statement) -> str:
     """ "58 s more of driving bring the widest interval of axebot from 27 % (viscous friction turning) to 6 % (..)" """
     numbers = statement.numbers
@@ -227,6 +241,11 @@ def _of_groups(statement: Statement) -> str:
 SENTENCES = {
     "planned": Sentence(_planned),
     "planned_next": Sentence(_planned_next),
+    "planned_rig": Sentence(_planned_rig),
+    "rig_turns": Sentence(
+        "one motor, its wheel off the ground, from rest; it turns at up to {top:.3g} rad/s, under {limit:.3g} {unit}; "
+        "drive it once, log it from its first row on, and identify it as `what` motors"
+    ),
     "plan_tells_apart": Sentence(_tells_apart),
     "plan_asks": Sentence(_asks),
     "plan_stays_inside": Sentence(_inside),

@@ -61,7 +61,7 @@ def test_a_robot_that_was_not_identified_has_no_next_drive():
 
 def test_the_command_plans_the_next_drive(fit, tmp_path):
     path = tmp_path / "fit.toml"
-    fit.save(path)
+    omnidyn.save_robot(fit, path)
     said, code, err = command("plan", "--next", path, "--time", "20", "--noise", "twist=0.02,0.02,0.1", "--json")
     assert code == 0, err
     assert set(said["predicted"]) == set(BOX)
@@ -121,7 +121,9 @@ def test_limits_are_kept(name, limit):
         "traction": np.abs(force).max() / load,
     }
     assert 0.3 * limit < asked[name] <= 1.001 * limit
-    assert {"current": "draw too much current", "heat": "heat 0.5 W", "traction": "ask too much grip"}[name] in str(made)
+    assert {"current": "draw too much current", "heat": "heat 0.5 W", "traction": "ask too much grip"}[name] in str(
+        made
+    )
 
 
 def test_wheels_that_may_slip_do_not_slip_under_a_plan():

@@ -43,7 +43,9 @@ class Aim:
         """
         found = [k for k, name in enumerate(names) if (self.counts(name) if self.names else k < count)]
         if self.names and (missing := [key for key in self.keys if key not in names[:count]]):
-            raise InputError("not a number that is free", got=missing[0], expected=", ".join(names[:count]), where="aim")
+            raise InputError(
+                "not a number that is free", got=missing[0], expected=", ".join(names[:count]), where="aim"
+            )
         return found
 
     def score(self, places: Sequence[int]) -> Score:
@@ -62,7 +64,7 @@ class Aim:
 
 
 def aim_of(text: str, robot: Robot) -> Aim:
-    """"" or "D", "A", "next", a key of the robot file, or two explanations "ONE,OTHER": keys or nuisances of a fit.
+    """ "" or "D", "A", "next", a key of the robot file, or two explanations "ONE,OTHER": keys or nuisances of a fit.
 
     Raises InputError for anything else.
     """

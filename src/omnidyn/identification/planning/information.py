@@ -66,9 +66,7 @@ def told_by(
     values, moving_axes = solution.state.point.values, fit.groups[0].moving_axes
     blind = blind_directions(problem, values, found.ways, moving_axes) if cures else ()
     covariance = found.covariance / np.outer(relative, relative)
-    return Prediction(
-        problem.names, problem.robot_count, values, found.std / relative, found.open, covariance, blind
-    )
+    return Prediction(problem.names, problem.robot_count, values, found.std / relative, found.open, covariance, blind)
 
 
 def information_of(runs: Sequence[Run], robot: Robot, question: OutputError) -> tuple[tuple[str, ...], FloatArray]:

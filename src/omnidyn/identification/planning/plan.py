@@ -41,6 +41,7 @@ SLOWEST, FASTEST = 5.0, 1000.0  # [Hz]
 DOUBTED = ("gain", "dead_band")  # what a fit may need beside the numbers of the file: moves must tell that apart too
 SEED = 0  # of the robots and of the noise
 REST = 1.0  # [s] before the first move
+VOLUME = Aim().score([])
 
 
 def plan(
@@ -118,6 +119,8 @@ def plan(
     left_out: Counter[str] = Counter()
     for _ in range(ATTEMPTS):
         kept, left_out = fitting(moves, border, planner.limits)
+        if not kept:
+            break
         try:
             made = planner.search(kept, seconds, progress)
         except InsufficientDataError:  # nothing that fits moves it so far that its sensors see it
@@ -177,15 +180,19 @@ class _Planner:
         best, best_score = None, math.inf
         turn = self._quarter_turn(candidates) if {TILT, PUSH} <= set(self.aim.nuisances) else None
         time -= 2.0 * turn.duration if turn else 0.0
+        # what is best by the volume is often good for another aim: it is compared too
+        scores = list(dict.fromkeys((score, VOLUME) if self.aim != Aim() else (score,)))
         for k in range(SEARCHES):
             progress(Report("choosing moves", k, SEARCHES))
             kept = np.flatnonzero(rng.random(len(candidates)) < KEPT) if k else np.arange(len(candidates))
-            by = Aim().score([]) if k % 2 else score  # what is best by the volume is often good for another aim
-            order = [int(kept[i]) for i in chosen([candidates[j] for j in kept], information[kept], time, by, begun)]
-            made = self._programs(opening, [candidates[j] for j in order], seconds, turn)
-            of_plan = self._score(told_by([self._recorded(self.robot, made.share, rng)], self.robot, asked, is_coarse=True))
-            if best is None or of_plan < best_score:
-                best, best_score = made, of_plan
+            for by in scores:
+                some = [candidates[j] for j in kept]
+                order = [int(kept[i]) for i in chosen(some, information[kept], time, by, begun)]
+                made = self._programs(opening, [candidates[j] for j in order], seconds, turn)
+                log = self._recorded(self.robot, made.share, np.random.default_rng(SEED))
+                of_plan = self._score(told_by([log], self.robot, asked, is_coarse=True))
+                if best is None or of_plan < best_score:
+                    best, best_score = made, of_plan
         assert best is not None
         return best
 
