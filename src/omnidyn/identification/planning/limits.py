@@ -30,8 +30,8 @@ class Limits(NamedTuple):
 
 
 class Strain(NamedTuple):
-    """What a run asks of a robot: current [A] and traction [-] at most, as in Limits; energy [J]: in the windings of the
-    hottest motor."""
+    """What a run asks of a robot: current [A] and traction [-] at most, as in Limits; energy [J]: in the windings of
+    the hottest motor."""
 
     current: float
     energy: float
@@ -43,7 +43,9 @@ def limits_of(robot: Robot, given: Mapping[str, Any] | None, learns_grip: bool) 
 
     Raises InputError for another name, or what is no number above 0.
     """
-    limits = {"traction": GRIP_SHARE * float(np.min(mu)) for mu in [robot.wheels.traction_mu] if mu and not learns_grip}
+    mu, limits = robot.wheels.traction_mu, dict[str, float]()
+    if mu is not None and not learns_grip:
+        limits["traction"] = GRIP_SHARE * float(np.min(mu))
     for name, value in (given or {}).items():
         if name not in Limits._fields:
             raise InputError("no such limit", got=name, expected=", ".join(Limits._fields), where="limits")

@@ -69,9 +69,9 @@ def plan(
         seconds: Of all of it, with the part that is held out [s].
         free: What is to be learnt, by keys of the robot file; default: as `identify`, after a fit what that told.
         aim: What is to be learnt best. Default, or "D": the geometric mean of all standard errors; "A": the root of the
-            mean of their squares; a key: that number; two keys or nuisances, "dead_band,friction.axes.coulomb": which of
-            these explanations is right; "next": the widest interval of a robot file that `identify` wrote, with what
-            its logs told counted beside the new one.
+            mean of their squares; a key: that number; two keys or nuisances, "gain,friction.axes.coulomb": which of
+            these explanations is right; "next": the widest interval of a robot file that `identify` wrote, beside what
+            its logs told.
         noise: Channel (wheel_angle, wheel_speed, current, twist, pose) -> std of what is recorded, one number or one
             per component; of wheel_angle the step of a count [rad]. Default: by the [sensors] of the robot file, counts
             and poses; where it says nothing of counts, wheel speeds that are differences of 2048 a turn.
@@ -230,8 +230,8 @@ class _Planner:
         seconds: float,
         turn: PlannedMove | None,
     ) -> _Programs:
-        """The rows of a plan, every other move after a `turn`, where there is one. Held out: a step from rest along each
-        axis, then its moves once more, other side first, as many as there is time for."""
+        """The rows of a plan, every other move after a `turn`, where there is one. Held out: a step from rest along
+        each axis, then its moves once more, other side first, as many as there is time for."""
         program = [*opening, *moves]
         if turn:
             back = replace(turn, level=-turn.level)

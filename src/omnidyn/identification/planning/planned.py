@@ -76,7 +76,7 @@ class Plan(Displayable):
     apart: Mapping[str, float] = field(default_factory=dict)
     tried: int = 0
     left_out: Mapping[str, int] = field(default_factory=dict)
-    limits: Limits = Limits()
+    limits: Limits = field(default_factory=Limits)
 
     @property
     def seconds(self) -> float:
