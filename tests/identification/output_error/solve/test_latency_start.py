@@ -24,6 +24,5 @@ def test_counts_that_are_late_are_fitted_from_friction_far_off(counted, number, 
     wrong = with_friction(AXEBOT, [factor * value for value in TRUTH.values()])
     solution = Fit.of([counted[number]], wrong, QUESTION).solve()
     found = dict(zip(solution.solver.problem.names, solution.state.point.values.tolist(), strict=True))
-    assert solution.converged
     assert found["latency.wheel_angle"] == pytest.approx(LATE / RATE, abs=2e-4)
     assert all(found[name] == pytest.approx(value, rel=0.01) for name, value in TRUTH.items())
