@@ -61,6 +61,7 @@ NAMES = {
     "control": "tracking on the eight references of the peers, seven conditions, every controller (three minutes)",
     "control_plants": "tracking of richer robots: identified numbers beside those of a data sheet (two minutes)",
     "control_mismatch": "the same with wrong friction, payload, slip, jumps, missing samples, latency (a minute)",
+    "control_gains": "LeKiwi under 20 gains of its speed loop, beside a PI of the pose (a minute)",
     "control_chain": "log, identify, track on these plants: a guessed robot beside the fitted one (two minutes)",
     "control_casadi": "the predictive controller beside CasADi with IPOPT on these plants (a minute)",
     "tune": "what tune finds, on an independent plant: errors before and after, three robots and sensors (15 minutes)",

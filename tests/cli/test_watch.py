@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import omnidyn
+from omnidyn.cli import watch
 from tests.support.axebot_logs import noisy, voltages
 
 SECONDS = 20.0
@@ -20,13 +21,6 @@ def lines(tmp_path_factory):
     path = tmp_path_factory.mktemp("watch") / "log.csv"
     omnidyn.write_run(noisy(run, 3), path)
     return path.read_text().splitlines(keepends=True)
-
-
-def later(act, pause=0.3):
-    """Do something while the command runs."""
-    thread = threading.Thread(target=lambda: (time.sleep(pause), act()), daemon=True)
-    thread.start()
-    return thread
 
 
 def test_a_file_that_grows_and_is_written_anew(call, here, lines, monkeypatch):
@@ -68,20 +62,24 @@ def test_standard_input_gives_a_line_of_json_each_second(call, here, monkeypatch
     assert "not yet: after 20 s" in err.lower()
 
 
-def test_a_socket(call, lines):
+def test_a_socket(call, lines, monkeypatch):
+    listening, say = threading.Event(), watch.say
+    monkeypatch.setattr(watch, "say", lambda text: (say(text), listening.set()))  # its first words: it listens
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
 
     def send():
+        assert listening.wait(60)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             for first in range(0, 800, 10):
                 sender.sendto("".join(lines[first : first + 10]).encode(), ("127.0.0.1", port))
                 time.sleep(0.002)
 
-    thread = later(send, 1.0)
+    thread = threading.Thread(target=send, daemon=True)
+    thread.start()
     code, out, err = call("watch", f"udp:{port}", "--robot", "axebot", "--idle", "2", "--within", "60")
-    thread.join()
+    thread.join(60)
     assert f"listening at 127.0.0.1:{port}" in err
     assert "     7 s  " in out
     assert code in (0, 4)

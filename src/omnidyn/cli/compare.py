@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -79,7 +80,11 @@ def compare(
 def _robots(names: Sequence[str], with_: str) -> list[Robot]:
     from omnidyn.model.vary import vary_as
 
-    return [vary_as(omnidyn.load_robot(name), with_) for name in names]
+    robots = [vary_as(omnidyn.load_robot(name), with_) for name in names]
+    stems = [Path(name).stem for name in names]
+    if len({robot.name for robot in robots}) < len(set(stems)):  # before and after a fit: told apart by their files
+        return [robot.replace(name=stem) for robot, stem in zip(robots, stems, strict=True)]
+    return robots
 
 
 def _runs(

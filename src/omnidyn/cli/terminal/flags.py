@@ -21,6 +21,7 @@ PLAIN_OPTIONS = (
     "fail_if",
     "force",
     "force_guess",
+    "free_base",
     "full",
     "horizon",
     "map",
