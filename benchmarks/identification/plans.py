@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.signal import chirp, lfilter
@@ -273,8 +273,8 @@ def _next(table: Table) -> None:
         robot="axebot", what="widest of one fit", **{"standard errors %": 50.0 * max(map(fit.half_width, fit.value))}
     )
     table.add(
-        "0.8 to 1.25", 0.8 <= promised / aimed <= 1.25, robot="axebot", what="widest after plan --next, predicted over got",
-        ratio=promised / aimed, **{"standard errors %": aimed},
+        "0.8 to 1.25", 0.8 <= promised / aimed <= 1.25, robot="axebot",
+        what="widest after plan --next, predicted over got", ratio=promised / aimed, **{"standard errors %": aimed},
     )  # fmt: skip
     table.add(
         ">= 1", again >= aimed, robot="axebot", what="widest after the first plan again",
@@ -299,6 +299,16 @@ def _criterion(log: omnidyn.Run, robot: omnidyn.Robot, free: tuple[str, ...], nu
     return 2.0 * solution.state.objective + len(solution.solver.problem.parameters) * float(np.log(log.twist.size))
 
 
+class Explanation(NamedTuple):
+    """name: of it. world: a robot that has it, of a size from 0 to 1. believed, free, nuisances: of the fit by it."""
+
+    name: str
+    world: Callable[[float], omnidyn.Robot]
+    believed: omnidyn.Robot
+    free: tuple[str, ...] = PLAIN
+    nuisances: tuple[str, ...] = ()
+
+
 def _explanations(table: Table) -> None:
     """Of two explanations, which is right after the planned minute."""
     robot = omnidyn.load_robot("axebot")
@@ -311,33 +321,38 @@ def _explanations(table: Table) -> None:
             made = key.set(made, size * key.get(made))
         return made
 
-    Size = Callable[[float], omnidyn.Robot]
-    pairs: dict[str, tuple[tuple[str, Size, omnidyn.Robot, tuple[str, ...], tuple[str, ...]], ...]] = {
+    def banded(x: float) -> omnidyn.Robot:
+        return robot.replace(drive=robot.drive.replace(dead_band=0.1 + 0.3 * x))
+
+    def tilted(x: float) -> omnidyn.Robot:
+        return robot.replace(floor=robot.floor.replace(tilt=0.5 + x, downhill=30.0))
+
+    pairs: dict[str, tuple[Explanation, ...]] = {
         "dead_band,friction.axes.coulomb": (
-            ("dead band", lambda x: robot.replace(drive=robot.drive.replace(dead_band=0.1 + 0.3 * x)), robot, viscous, ("dead_band",)),
-            ("Coulomb", lambda x: stronger("coulomb", 1.1 + 0.3 * x), robot, PLAIN, ()),
+            Explanation("dead band", banded, robot, viscous, ("dead_band",)),
+            Explanation("Coulomb", lambda x: stronger("coulomb", 1.1 + 0.3 * x), robot),
         ),
         "friction.axes.stribeck_speed,friction.axes.viscous": (
-            ("Stribeck", lambda x: falling(robot, 1.2 + 0.3 * x), falling(robot, 1.3), PLAIN, ()),
-            ("viscous", lambda x: stronger("viscous", 1.1 + 0.3 * x), robot, PLAIN, ()),
+            Explanation("Stribeck", lambda x: falling(robot, 1.2 + 0.3 * x), falling(robot, 1.3)),
+            Explanation("viscous", lambda x: stronger("viscous", 1.1 + 0.3 * x), robot),
         ),
         "tilt,push": (
-            ("tilt", lambda x: robot.replace(floor=robot.floor.replace(tilt=0.5 + 1.0 * x, downhill=30.0)), robot, PLAIN, ("tilt",)),
-            ("push", lambda x: robot, robot, PLAIN, ("push",)),
+            Explanation("tilt", tilted, robot, nuisances=("tilt",)),
+            Explanation("push", lambda _: robot, robot, nuisances=("push",)),
         ),
-    }  # fmt: skip
+    }
     for pair, sides in pairs.items():
         begun = time.process_time()
         believed = falling(robot, 1.3) if "stribeck" in pair else robot
         plan = omnidyn.plan(believed, (ROOM, ROOM), SECONDS, aim=pair, noise={"twist": NOISE})
         took, volts = time.process_time() - begun, plan.commands().voltage
-        for name, world, *_ in sides:
+        for name, world in ((side.name, side.world) for side in sides):
             right = 0
             for seed in range(EACH):
                 rng = np.random.default_rng([seed, len(name)])
                 true, size = world(rng.random()), 0.1 + 0.3 * rng.random()
                 log = log_of(true, volts, rng, push=(size, -size, 0.0) if name == "push" else (0.0, 0.0, 0.0))
-                found = {other: _criterion(log, *fit) for other, _, *fit in sides}
+                found = {side.name: _criterion(log, side.believed, side.free, side.nuisances) for side in sides}
                 right += min(found, key=lambda other: found[other]) == name
             table.add(
                 "9 of 10", right >= 0.9 * EACH, robot="axebot", what=f"{pair}: {name} is told", of=EACH,

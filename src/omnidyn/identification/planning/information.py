@@ -23,13 +23,13 @@ from omnidyn.run import Run
 
 
 class Prediction(NamedTuple):
-    """names: of what is free, the numbers of the robot file first, `count` of them. value, share (P,): each, and its
+    """names: of what is free, those of the robot file first, `robot_count` of them. value, share (P,): each, and its
     standard error as a share of it, of a nuisance that may be 0 in its own unit. open (P,): whether the logs leave it
     open, a prior or none. covariance (P, P): of these changes. blind: what they do not show, and what would.
     """
 
     names: tuple[str, ...]
-    count: int
+    robot_count: int
     value: FloatArray
     share: FloatArray
     open: BoolArray
@@ -43,9 +43,9 @@ class Prediction(NamedTuple):
         return float(self.share[self.names.index(name)])
 
     def beside(self, known: FloatArray) -> Prediction:
-        """The same beside what other logs told before: their information about the numbers of the robot, (count,
-        count)."""
-        seen = np.flatnonzero(~self.open[: self.count])
+        """The same beside what other logs told before: their information about the numbers of the robot, (robot_count,
+        robot_count)."""
+        seen = np.flatnonzero(~self.open[: self.robot_count])
         information = known.copy()
         information[np.ix_(seen, seen)] += np.linalg.inv(self.covariance[np.ix_(seen, seen)])
         shown = np.diag(information) > 0.0

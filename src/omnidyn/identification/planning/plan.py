@@ -204,12 +204,12 @@ class _Planner:
         """The prediction beside what the fit before told."""
         if self.aim.criterion != NEXT:
             return prediction
-        return prediction.beside(self._known(prediction.names[: prediction.count]))
+        return prediction.beside(self._known(prediction.names[: prediction.robot_count]))
 
     def _score(self, prediction: Prediction) -> float:
         """That of a whole plan: less is better."""
         after = self._beside(prediction)
-        places = self.aim.places(after.names, after.count)
+        places = self.aim.places(after.names, after.robot_count)
         return self.aim.of_std(np.array([min(after.of(after.names[k]), UNKNOWN) for k in places]))
 
     def _quarter_turn(self, moves: Sequence[PlannedMove]) -> PlannedMove | None:
@@ -262,7 +262,7 @@ class _Planner:
         ]
         values = told_by([self._recorded(self.robot, made.share, rng)], self.robot, self.question, cures=True)
         apart = self._apart(values)
-        names = values.names[: values.count]
+        names = values.names[: values.robot_count]
         halves = {name: 2.0 * np.array([one.of(name) for one in predictions]) for name in names}
         before = np.diag(np.linalg.pinv(self._known(names), hermitian=True))
         predicted = {
@@ -303,7 +303,7 @@ class _Planner:
         """
         if len(self.aim.names) < 2:
             return {}
-        names = [prediction.names[k] for k in self.aim.places(prediction.names, prediction.count)]
+        names = [prediction.names[k] for k in self.aim.places(prediction.names, prediction.robot_count)]
         if any(not np.isfinite(prediction.of(name)) for name in names):
             cures = [str(blind.how_to_show()) for blind in prediction.blind if set(names) & set(blind.changes)]
             raise InsufficientDataError(

@@ -252,7 +252,7 @@ def _log(
     """What the bench logs of a motor; passed: what the driver passes on, as a share of the largest input."""
     speed, angle = turned(motor, volts * passed, dt)
     t, held = np.asarray(dt * np.arange(len(speed)), dtype=float), np.append(share, share[-1:])[:, None]
-    channels: dict[str, FloatArray] = {}
+    channels: dict[str, Any] = {}
     if "wheel_angle" in stds:
         tick = float(stds["wheel_angle"][0])
         channels["wheel_angle"] = tick * np.floor(angle[:, None] / tick + rng.random())
