@@ -41,16 +41,16 @@ def test_the_next_drive_narrows_the_widest_interval_as_it_was_told(fit, first_lo
     both = omnidyn.identify([first_log, log_of(made, 1)], AXEBOT, OutputError(free=BOX, nuisances=())).estimate
     before = omnidyn.identify(first_log, AXEBOT, OutputError(free=BOX, nuisances=())).estimate
     for name, number in made.predicted.items():
-        assert number.known == pytest.approx(before.half_width(name), rel=0.1)
-        assert number.half < number.known
+        assert number.before == pytest.approx(before.half_width(name), rel=0.1)
+        assert number.half < number.before
         assert 0.75 < both.half_width(name) / number.half < 1.33
-    widest = max(number.known for number in made.predicted.values())
+    widest = max(number.before for number in made.predicted.values())
     assert max(number.half for number in made.predicted.values()) < 0.8 * widest
 
 
 def test_the_next_drive_is_for_the_widest_interval(fit):
     plain, after = (omnidyn.plan(fit, ROOM, 30.0, noise=NOISE, aim=aim, free=BOX) for aim in ("", "next"))
-    widest = max(after.predicted, key=lambda name: after.predicted[name].known)
+    widest = max(after.predicted, key=lambda name: after.predicted[name].before)
     assert after.predicted[widest].half < plain.predicted[widest].half
 
 
@@ -65,7 +65,7 @@ def test_the_command_plans_the_next_drive(fit, tmp_path):
     said, code, err = command("plan", "--next", path, "--time", "20", "--noise", "twist=0.02,0.02,0.1", "--json")
     assert code == 0, err
     assert set(said["predicted"]) == set(BOX)
-    assert all(number["half"] < number["known"] for number in said["predicted"].values())
+    assert all(number["half"] < number["before"] for number in said["predicted"].values())
     _, code, err = command("plan", "--next", path, "--for", BOX[0])
     assert code == 3
     assert "both --next and --for" in err

@@ -104,13 +104,13 @@ def fitted_keys(robot: Robot) -> tuple[str, ...]:
 def known_of(robot: Robot, names: Sequence[str]) -> FloatArray:
     """What the fit that wrote a robot file knows of some numbers: the inverse of the covariance of their relative
     changes, by the std and [correlation] of the file. Shape (names, names), 0 for what it does not tell."""
-    known, information = told(robot), np.zeros((len(names), len(names)))
-    pairs = [(k, names.index(key)) for k, key in enumerate(known.keys) if key in names and known.value[k]]
+    numbers, information = told(robot), np.zeros((len(names), len(names)))
+    pairs = [(k, names.index(key)) for k, key in enumerate(numbers.keys) if key in names and numbers.value[k]]
     if not pairs:
         return information
     rows, places = map(list, zip(*pairs, strict=True))
-    share = known.std[rows] / np.abs(known.value[rows])
-    values, vectors = np.linalg.eigh(known.correlation[np.ix_(rows, rows)])
+    share = numbers.std[rows] / np.abs(numbers.value[rows])
+    values, vectors = np.linalg.eigh(numbers.correlation[np.ix_(rows, rows)])
     inverse = (vectors / np.maximum(values, SURE)) @ vectors.T
     information[np.ix_(places, places)] = inverse / np.outer(share, share)
     return information

@@ -42,11 +42,11 @@ class Prediction(NamedTuple):
             return math.inf
         return float(self.share[self.names.index(name)])
 
-    def beside(self, known: FloatArray) -> Prediction:
+    def beside(self, of_others: FloatArray) -> Prediction:
         """The same beside what other logs told before: their information about the numbers of the robot, (robot_count,
         robot_count)."""
         seen = np.flatnonzero(~self.open[: self.robot_count])
-        information = known.copy()
+        information = of_others.copy()
         information[np.ix_(seen, seen)] += np.linalg.inv(self.covariance[np.ix_(seen, seen)])
         shown = np.diag(information) > 0.0
         share, at = np.full(len(self.share), np.inf), np.flatnonzero(shown)

@@ -173,9 +173,9 @@ class _Planner:
         runs = [self._recorded(self.rolling, move.both(self.robot, self.dt), rng) for move in candidates]
         asked = replace(self.question, nuisances=tuple(dict.fromkeys((*DOUBTED, *self.aim.nuisances))))
         names, information = information_of(runs, self.rolling, asked)
-        known = self._known(names)
+        earlier = self._known(names)
         score = self.aim.score(self.aim.places(names, sum(find_key(name) is not None for name in names)))
-        begun = known + information[[candidates.index(move) for move in opening]].sum(axis=0)
+        begun = earlier + information[[candidates.index(move) for move in opening]].sum(axis=0)
         time = (1.0 - HELD_OUT_SHARE) * seconds - REST - sum(move.duration for move in opening)
         best, best_score = None, math.inf
         turn = self._quarter_turn(candidates) if {TILT, PUSH} <= set(self.aim.nuisances) else None

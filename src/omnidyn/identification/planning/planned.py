@@ -33,12 +33,12 @@ OPEN_SHARE = 0.5  # half an interval, of the number: what is wider is not learnt
 @dataclass(frozen=True)
 class Predicted:
     """value: of a number now. half, worst: of its 95 % interval, as a share of the value: in the middle of the robots
-    drawn, and in the worst of them. known: the same before, of a plan for the next drive after a fit."""
+    drawn, and in the worst of them. before: the same until now, of a plan for the next drive after a fit."""
 
     value: float
     half: float
     worst: float
-    known: float = math.inf
+    before: float = math.inf
 
     @property
     def is_learnt(self) -> bool:
@@ -115,9 +115,9 @@ class Plan(Displayable):
         }
         if self.aim.criterion == NEXT:
             widest = max(self.predicted, key=lambda name: self.predicted[name].half)
-            before = max(self.predicted, key=lambda name: self.predicted[name].known)
+            before = max(self.predicted, key=lambda name: self.predicted[name].before)
             numbers |= {"widest": widest, "share": self.predicted[widest].half}
-            numbers |= {"before": before, "known": self.predicted[before].known}
+            numbers |= {"before": before, "known": self.predicted[before].before}
             return Statement("planned_next", NOTE, self.robot.name, numbers)
         return Statement("planned", WARNING if missing else NOTE, self.robot.name, numbers)
 
@@ -160,7 +160,7 @@ class Plan(Displayable):
                 in_words(name),
                 name,
                 f"{number.value:.4g}",
-                *([percent_cell(number.known)] if is_next else []),
+                *([percent_cell(number.before)] if is_next else []),
                 percent_cell(number.half),
                 percent_cell(number.worst),
             )

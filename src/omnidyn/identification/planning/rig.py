@@ -45,7 +45,7 @@ GAIN, OFFSET_OF_BAND, CURVE = "gain", "offset over dead band", "driver curve"
 FORWARD, BACKWARD = "forward", "backward"
 WORDS = {START: "first motion", STOP: "stop"}
 NAMES = (
-    *(f"{word} {way}" for word in WORDS.values() for way in (FORWARD, BACKWARD)),
+    *(f"{word} {direction}" for word in WORDS.values() for direction in (FORWARD, BACKWARD)),
     *(GAIN, "lag", "dead band", OFFSET_OF_BAND, CURVE),
 )
 NUISANCES = ("offset",)  # that a motor may have beside its line
@@ -96,10 +96,10 @@ class RigPlan(Displayable):
     @property
     def verdict(self) -> Statement:
         """How well the motor will be known."""
-        told = {name: half for name, (half, _) in self.predicted.items() if math.isfinite(half)}
-        widest = max(told, key=lambda name: told[name], default="")
-        numbers = {"seconds": self.seconds, "told": len(told), "count": len(self.predicted), "widest": widest}
-        numbers |= {"share": told.get(widest), "missing": self.missing}
+        shares = {name: half for name, (half, _) in self.predicted.items() if math.isfinite(half)}
+        widest = max(shares, key=lambda name: shares[name], default="")
+        numbers = {"seconds": self.seconds, "told": len(shares), "count": len(self.predicted), "widest": widest}
+        numbers |= {"share": shares.get(widest), "missing": self.missing}
         return Statement("planned_rig", WARNING if self.missing else NOTE, self.robot.name, numbers)
 
     def document(self) -> Document:
@@ -265,18 +265,18 @@ def _log(
 def _told(straight: Run, bent: Run) -> dict[str, float]:
     """Half the 95 % interval of each number that a study tells of a motor, over the number; infinite where it does not.
     bent: a log of the same motor behind a driver that is no line."""
-    told = dict.fromkeys(NAMES, math.inf)
+    shares = dict.fromkeys(NAMES, math.inf)
     for curve in curves_of_logs(motor_logs([bent]))[0]:
-        told[CURVE] = 2.0 * float((curve.std / curve.speed).max())
+        shares[CURVE] = 2.0 * float((curve.std / curve.speed).max())
     try:
         study = study_motors([straight], None, MotorFit(nuisances=NUISANCES))
     except OmnidynError:
-        return told
-    told |= _of_line(study.motors[0])
+        return shares
+    shares |= _of_line(study.motors[0])
     for start in study.starts:
-        way = FORWARD if start.side > 0.0 else BACKWARD
-        told |= {f"{word} {way}": _share(*start.ci95[key], start.value[key]) for key, word in WORDS.items()}
-    return told
+        direction = FORWARD if start.side > 0.0 else BACKWARD
+        shares |= {f"{word} {direction}": _share(*start.ci95[key], start.value[key]) for key, word in WORDS.items()}
+    return shares
 
 
 def _of_line(motor: MotorEstimate) -> dict[str, float]:
