@@ -18,6 +18,7 @@ from omnidyn.cli.terminal.streams import say, to_json
 from omnidyn.cli.terminal.telling import as_json, tell
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
+from omnidyn.model.robot_file import robot_to_toml
 
 if TYPE_CHECKING:
     from omnidyn.document import Document
@@ -109,14 +110,15 @@ def plan(
             free=free,
             aim="next" if next_ else for_,
             noise=stds,
-            limits=limits,
             rate=rate,
             progress=progress,
+            **(limits or {}),
         )
     if out:
         for path, held_out in zip(files, (False, True), strict=False):
             _write(made, held_out, path, force)
-        _promise(made.document(), source, out, force)
+        check = sha256(Path(files[1]).read_bytes()).hexdigest()
+        _promise(made.document(), source, out, force, check_sha256=check, robot_file=robot_to_toml(loaded))
     tell(made.document(), json, provenance([source]), output=out or None)
     if picture:
         from omnidyn.report.figures.plan import draw_plan
@@ -130,9 +132,10 @@ def _say_files(files: list[str]) -> None:
     say(f"omnidyn: wrote {', '.join(files)}" if files else "omnidyn: nothing written; -o FILE writes the program")
 
 
-def _promise(document: Document, source: dict[str, str], out: str, force: bool) -> None:
+def _promise(document: Document, source: dict[str, str], out: str, force: bool, **more: str) -> None:
     """Write what a plan promises beside its program, with the hash of that."""
-    promised = as_json(document, provenance([source]), program_sha256=sha256(Path(out).read_bytes()).hexdigest())
+    program = sha256(Path(out).read_bytes()).hexdigest()
+    promised = as_json(document, provenance([source]), program_sha256=program, **more)
     write_atomic(str(Path(out).with_suffix(".json")), to_json(promised) + "\n", force)
 
 

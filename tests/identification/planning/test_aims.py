@@ -109,7 +109,7 @@ def test_an_aim_that_means_nothing_is_refused(aim):
 
 @pytest.mark.parametrize(("name", "limit"), [("current", 6.0), ("heat", 0.5), ("traction", 1.0)])
 def test_limits_are_kept(name, limit):
-    made = omnidyn.plan(AXEBOT, ROOM, 30.0, noise=NOISE, free=BOX, limits={name: limit})
+    made = omnidyn.plan(AXEBOT, ROOM, 30.0, noise=NOISE, free=BOX, **{name: limit})
     run = omnidyn.simulate(AXEBOT, made.commands().voltage, made.dt)
     seconds = len(made.share) * made.dt
     heat = (run.current**2).sum(axis=0).max() * made.dt * AXEBOT.motor.resistance / seconds
@@ -137,7 +137,7 @@ def test_wheels_that_may_slip_do_not_slip_under_a_plan():
 @pytest.mark.parametrize(
     ("limits", "words"),
     [
-        ({"noise": 1.0}, "no such limit"),
+        ({"power": 1.0}, "no such limit"),
         ({"heat": 0.0}, "no limit of heat"),
         ({"current": math.nan}, "no limit of current"),
         ({"traction": 1e-3}, "within the limit of traction"),
@@ -145,7 +145,7 @@ def test_wheels_that_may_slip_do_not_slip_under_a_plan():
 )
 def test_limits_that_cannot_be_are_refused(limits, words):
     with pytest.raises(omnidyn.OmnidynError, match=words):
-        omnidyn.plan(AXEBOT, ROOM, 20.0, noise=NOISE, limits=limits)
+        omnidyn.plan(AXEBOT, ROOM, 20.0, noise=NOISE, **limits)
 
 
 def test_the_command_takes_limits():

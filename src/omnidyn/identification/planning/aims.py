@@ -11,7 +11,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, NUISANCES
 from omnidyn.model.keys import expand
-from omnidyn.model.known.told import numbers_told, told
+from omnidyn.model.known.told import numbers_told, uncertainty_of
 from omnidyn.model.robot import IDENTIFIED, Robot
 
 D, A, NEXT = "D", "A", "next"  # the volume of all intervals; the sum of their squares; the widest, after a fit
@@ -104,7 +104,7 @@ def fitted_keys(robot: Robot) -> tuple[str, ...]:
 def known_of(robot: Robot, names: Sequence[str]) -> FloatArray:
     """What the fit that wrote a robot file knows of some numbers: the inverse of the covariance of their relative
     changes, by the std and [correlation] of the file. Shape (names, names), 0 for what it does not tell."""
-    numbers, information = told(robot), np.zeros((len(names), len(names)))
+    numbers, information = uncertainty_of(robot), np.zeros((len(names), len(names)))
     pairs = [(k, names.index(key)) for k, key in enumerate(numbers.keys) if key in names and numbers.value[k]]
     if not pairs:
         return information

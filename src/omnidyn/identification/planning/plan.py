@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,9 @@ from omnidyn.simulation.batch.sample import sample
 DRAWS, GUESS = 10, (0.7, 1.3)  # robots that may be meant; share of a number of which nothing is known
 ROOM_SHARE = 0.8  # of the way to the border: what a plan uses of it
 HELD_OUT_SHARE = 0.15  # of the time: a second program, to judge the fit by
-SEARCHES, KEPT = 8, 0.6  # plans that are compared whole; share of the moves that each of them may choose from
+SEARCHES, SEARCHES_OF_REST = 8, 24  # plans that are compared whole
+BEGUN_SHARE = 0.6  # of a ramp: one that was driven so far is not begun anew
+KEPT = 0.6  # of the moves: what each of them may choose from
 SMALLER = 0.8  # of the reach of a move, where a whole plan left the room
 ATTEMPTS = 4  # at a plan that stays inside
 SMALLEST_ROOM, LARGEST_ROOM = 0.1, 1000.0  # [m]
@@ -52,9 +54,9 @@ def plan(
     free: Sequence[str] | None = None,
     aim: str = "",
     noise: Mapping[str, Any] | None = None,
-    limits: Mapping[str, float] | None = None,
     rate: float = 100.0,
     progress: Progress = silent,
+    **limits: float,
 ) -> Plan:
     """Which minute of driving tells most about a robot, and how much that is.
 
@@ -75,10 +77,10 @@ def plan(
         noise: Channel (wheel_angle, wheel_speed, current, twist, pose) -> std of what is recorded, one number or one
             per component; of wheel_angle the step of a count [rad]. Default: by the [sensors] of the robot file, counts
             and poses; where it says nothing of counts, wheel speeds that are differences of 2048 a turn.
-        limits: "current": of all motors together [A]; "heat": of the hottest motor, in the mean of a move [W];
-            "traction": force of a wheel over what it carries; default: 0.8 of the grip of wheels that may slip.
         rate: Of commands and of the log [Hz].
         progress: Hears what is done.
+        limits: current=, of all motors together [A]; heat=, of the hottest motor, in the mean of a move [W];
+            traction=, force of a wheel over what it carries; default: 0.8 of the grip of wheels that may slip.
 
     Raises InputError for a room, a time, a limit or a noise that cannot be, for an aim that is not free, and for "next"
     of a robot that was not identified; UnsupportedError for a robot whose firmware holds the speeds of its wheels;
@@ -100,37 +102,48 @@ def plan(
             expected="a robot that takes volts or duties",
             remedy="plan for the same robot without [drive] kind = speed, if its motors can be driven directly",
         )
-    dt, goal = 1.0 / rate, aim_of(aim, robot)
+    goal = aim_of(aim, robot)
     question = _question(robot, free, goal)
+    planner = _planner(robot, 1.0 / rate, noise, question, limits)
+    return replace(planner, aim=goal).planned((width, depth), seconds, progress)
+
+
+def plan_rest(
+    robot: Robot,
+    driven: FloatArray,
+    seconds: float,
+    area: Sequence[float] = (3.0, 3.0),
+    *,
+    promised: Mapping[str, float],
+    noise: Mapping[str, Any] | None = None,
+    rate: float = 100.0,
+    progress: Progress = silent,
+) -> Plan:
+    """The rest of a plan whose drive was ended: what was driven counts, and what is left of the time is planned anew.
+
+    Args:
+        robot: As for `plan`.
+        driven: The input of what was driven and recorded, in rows of the plan, as share of the largest input.
+            Shape (rows, wheels).
+        seconds: That are left [s], for the program alone.
+        promised: Key -> half of the interval that the plan promised, as a share; all of them are to be reached.
+        area, noise, rate, progress: As for `plan`.
+
+    What it promises is for the logs of both drives together. Raises as `plan`.
+    """
+    width, depth = _room(area)
+    planner = _planner(robot, 1.0 / rate, noise, _question(robot, tuple(promised), Aim()), {})
+    planner = replace(planner, driven=driven, promised=promised)
+    return planner.that_tells().planned((width, depth), seconds / (1.0 - HELD_OUT_SHARE), progress)
+
+
+def _planner(
+    robot: Robot, dt: float, noise: Mapping[str, Any] | None, question: OutputError, limits: Mapping[str, float]
+) -> _Planner:
     learns_grip = any(key.startswith(GRIP) for key in (*robot.priors, *(question.free or ())))
-    planner = _Planner(
-        robot,
-        _robots(robot),
-        dt,
-        noise_of(robot, dt, noise),
-        question,
-        goal,
-        limits_of(robot, limits, learns_grip),
-        robot if learns_grip else robot.replace(wheels=robot.wheels.replace(traction_mu=None)),
-    )
-    border = ROOM_SHARE * 0.5 * min(width, depth)
-    progress(Report("trying moves"))
-    moves = planner.tried()
-    left_out: Counter[str] = Counter()
-    for _ in range(ATTEMPTS):
-        kept, left_out = fitting(moves, border, planner.limits)
-        if not kept:
-            break
-        try:
-            made = planner.search(kept, seconds, progress)
-        except InsufficientDataError:  # nothing that fits moves it so far that its sensors see it
-            break
-        progress(Report("driving it with robots that may be meant"))
-        reach = planner.reach((made.share, made.held_out))
-        if reach[0] < 0.5 * width and reach[1] < 0.5 * depth:
-            return replace(planner.predicted(made, (width, depth), reach), left_out=dict(left_out), tried=len(moves))
-        border *= SMALLER
-    raise _no_plan(width, depth, left_out, planner.limits)
+    rolling = robot if learns_grip else robot.replace(wheels=robot.wheels.replace(traction_mu=None))
+    kept = limits_of(robot, limits, learns_grip)
+    return _Planner(robot, _robots(robot), dt, noise_of(robot, dt, noise), question, kept, rolling)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,22 +165,55 @@ class _Planner:
     dt: float
     noise: Noise
     question: OutputError
-    aim: Aim
     limits: Limits
     rolling: Robot
+    aim: Aim = field(default_factory=Aim)
+    driven: FloatArray | None = None  # and recorded already, as share of the largest input
+    promised: Mapping[str, float] = field(default_factory=dict)  # half the interval of each number, as a share of it
+
+    def planned(self, area: tuple[float, float], seconds: float, progress: Progress) -> Plan:
+        """A plan that stays inside the room, in so many seconds with the part that is held out."""
+        width, depth = area
+        border = ROOM_SHARE * 0.5 * min(width, depth)
+        progress(Report("trying moves"))
+        moves, left_out = self.tried(), Counter[str]()
+        for _ in range(ATTEMPTS):
+            kept, left_out = fitting(moves, border, self.limits)
+            if not kept:
+                break
+            try:
+                made = self.search(kept, seconds, progress)
+            except InsufficientDataError:  # nothing that fits moves it so far that its sensors see it
+                break
+            progress(Report("driving it with robots that may be meant"))
+            reach = self.reach((made.share, made.held_out))
+            if reach[0] < 0.5 * width and reach[1] < 0.5 * depth:
+                return replace(self.predicted(made, area, reach), left_out=dict(left_out), tried=len(moves))
+            border *= SMALLER
+        raise _no_plan(width, depth, left_out, self.limits)
+
+    def that_tells(self) -> _Planner:
+        """The same without what was driven, where that tells nothing: it had hardly begun."""
+        if self.driven is None:
+            return self
+        try:
+            told_by([self._recorded(self.robot, self.driven, np.random.default_rng(SEED))], self.robot, self.question)
+        except InsufficientDataError:
+            return replace(self, driven=None)
+        return self
 
     def tried(self) -> list[TriedMove]:
-        """All moves, of the robot of the file and of the one that goes farthest."""
+        """All moves, of the robot of the file, and of those that go farthest and least far."""
         slips = self.rolling.wheels.traction_mu is not None
         robots = [one if slips else one.replace(wheels=self.rolling.wheels) for one in self.robots]
         probe = PlannedMove(FORWARD, STEP, 1.0, 1.2)
         distance = [_farthest(driven(robot, probe.input(robot, self.dt), self.dt)) for robot in robots]
-        ends = [self.rolling, robots[int(np.argmax(distance))]]
+        ends = [self.rolling, robots[int(np.argmax(distance))], robots[int(np.argmin(distance))]]
         return [tried(move, ends, self.limits, self.dt) for move in all_moves()]
 
     def search(self, moves: Sequence[TriedMove], seconds: float, progress: Progress) -> _Programs:
         """The best of a few plans from these moves, each from a part of them, compared whole."""
-        opening = _opening(moves)
+        opening = self._left_of(_opening(moves))
         candidates = [one.move for one in moves]
         rng = np.random.default_rng(SEED)
         runs = [self._recorded(self.rolling, move.both(self.robot, self.dt), rng) for move in candidates]
@@ -176,21 +222,27 @@ class _Planner:
         earlier = self._known(names)
         score = self.aim.score(self.aim.places(names, sum(find_key(name) is not None for name in names)))
         begun = earlier + information[[candidates.index(move) for move in opening]].sum(axis=0)
+        if self.driven is not None:
+            shown_names, more = information_of([self._recorded(self.rolling, self.driven, rng)], self.rolling, asked)
+            places = [names.index(name) for name in shown_names]  # a short drive tells nothing of some
+            begun[np.ix_(places, places)] += more[0]
         time = (1.0 - HELD_OUT_SHARE) * seconds - REST - sum(move.duration for move in opening)
         best, best_score = None, math.inf
         turn = self._quarter_turn(candidates) if {TILT, PUSH} <= set(self.aim.nuisances) else None
         time -= 2.0 * turn.duration if turn else 0.0
         # what is best by the volume is often good for another aim: it is compared too
         scores = list(dict.fromkeys((score, VOLUME) if self.aim != Aim() else (score,)))
-        for k in range(SEARCHES):
-            progress(Report("choosing moves", k, SEARCHES))
+        count = SEARCHES_OF_REST if self.promised else SEARCHES
+        question = self.question if self.promised else asked  # a promise is without doubts
+        for k in range(count):
+            progress(Report("choosing moves", k, count))
             kept = np.flatnonzero(rng.random(len(candidates)) < KEPT) if k else np.arange(len(candidates))
             for by in scores:
                 some = [candidates[j] for j in kept]
                 order = [int(kept[i]) for i in chosen(some, information[kept], time, by, begun)]
                 made = self._programs(opening, [candidates[j] for j in order], seconds, turn)
-                log = self._recorded(self.robot, made.share, np.random.default_rng(SEED))
-                of_plan = self._score(told_by([log], self.robot, asked, is_coarse=True))
+                logs = self._logs(self.robot, made.share, np.random.default_rng(SEED))
+                of_plan = self._score(told_by(logs, self.robot, question, is_coarse=True))
                 if best is None or of_plan < best_score:
                     best, best_score = made, of_plan
         assert best is not None
@@ -207,7 +259,9 @@ class _Planner:
         return prediction.beside(self._known(prediction.names[: prediction.robot_count]))
 
     def _score(self, prediction: Prediction) -> float:
-        """That of a whole plan: less is better."""
+        """That of a whole plan: less is better. Of a promise, how far the widest interval is beyond it."""
+        if self.promised:
+            return max(prediction.of(name) / min(half, UNKNOWN) for name, half in self.promised.items())
         after = self._beside(prediction)
         places = self.aim.places(after.names, after.robot_count)
         return self.aim.of_std(np.array([min(after.of(after.names[k]), UNKNOWN) for k in places]))
@@ -257,10 +311,9 @@ class _Planner:
         """The plan, with what the fit would say of its log for each robot that may be meant."""
         rng = np.random.default_rng(SEED)
         predictions = [
-            self._beside(told_by([self._recorded(robot, made.share, rng)], robot, self.question))
-            for robot in self.robots
+            self._beside(told_by(self._logs(robot, made.share, rng), robot, self.question)) for robot in self.robots
         ]
-        values = told_by([self._recorded(self.robot, made.share, rng)], self.robot, self.question, cures=True)
+        values = told_by(self._logs(self.robot, made.share, rng), self.robot, self.question, cures=True)
         apart = self._apart(values)
         names = values.names[: values.robot_count]
         halves = {name: 2.0 * np.array([one.of(name) for one in predictions]) for name in names}
@@ -314,6 +367,17 @@ class _Planner:
                 where="aim",
             )
         return {name: 2.0 * prediction.of(name) for name in names}
+
+    def _left_of(self, opening: list[PlannedMove]) -> list[PlannedMove]:
+        """What of the opening was not driven yet, or only a little."""
+        durations = np.array([move.duration for move in opening])
+        enough = REST + np.cumsum(durations) - (1.0 - BEGUN_SHARE) * durations
+        seconds = 0.0 if self.driven is None else len(self.driven) * self.dt
+        return [move for move, end in zip(opening, enough.tolist(), strict=True) if end > seconds]
+
+    def _logs(self, robot: Robot, share: FloatArray, rng: np.random.Generator) -> list[Run]:
+        """The log of a program, and that of what was driven before."""
+        return [self._recorded(robot, rows, rng) for rows in (share, self.driven) if rows is not None]
 
     def _recorded(self, robot: Robot, share: FloatArray, rng: np.random.Generator) -> Any:
         return recorded(robot, share, self.dt, self.noise, rng)
