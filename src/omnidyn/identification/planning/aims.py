@@ -23,7 +23,7 @@ Score = Callable[[FloatArray], float]  # of the covariance of relative changes: 
 
 
 @dataclass(frozen=True)
-class Aim:
+class PlanAim:
     """criterion: D, A or NEXT. names: of which it counts alone, as asked for; empty: of all numbers of the robot. keys:
     of the robot file among them, expanded; nuisances: the others. Two names are explanations to be told apart."""
 
@@ -63,13 +63,13 @@ class Aim:
         return float(np.mean(np.log(std)))
 
 
-def aim_of(text: str, robot: Robot) -> Aim:
+def aim_of(text: str, robot: Robot) -> PlanAim:
     """ "" or "D", "A", "next", a key of the robot file, or two explanations "ONE,OTHER": keys or nuisances of a fit.
 
     Raises InputError for anything else.
     """
     if text in ("", D, A, NEXT):
-        return Aim(text or D)
+        return PlanAim(text or D)
     names = tuple(name.strip() for name in text.split(","))
     nuisances = tuple(name for name in names if name.partition(".")[0] in EXPLANATIONS)
     if len(names) > 2 or not all(names) or len(set(names)) < len(names) or (len(names) == 1 and nuisances):
@@ -81,7 +81,7 @@ def aim_of(text: str, robot: Robot) -> Aim:
             where="aim",
         )
     keys = tuple(key for name in names if name not in nuisances for key in map(str, expand(name, robot)))
-    return Aim(D, names, keys, nuisances)
+    return PlanAim(D, names, keys, nuisances)
 
 
 def fitted_keys(robot: Robot) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ GRIP = "wheels.traction_mu"
 GRIP_SHARE = 0.8  # of what the file says the floor takes
 
 
-class Limits(NamedTuple):
+class PlanLimits(NamedTuple):
     """current [A]: of all motors together, at any time. heat [W]: in the windings of the hottest motor, in the mean of
     a move and its rest. traction [-]: force of a wheel over what it carries."""
 
@@ -30,7 +30,7 @@ class Limits(NamedTuple):
 
 
 class Strain(NamedTuple):
-    """What a run asks of a robot: current [A] and traction [-] at most, as in Limits; energy [J]: in the windings of
+    """What a run asks of a robot: current [A] and traction [-] at most, as in PlanLimits; energy [J]: in the windings of
     the hottest motor."""
 
     current: float
@@ -38,7 +38,7 @@ class Strain(NamedTuple):
     traction: float
 
 
-def limits_of(robot: Robot, given: Mapping[str, Any] | None, learns_grip: bool) -> Limits:
+def limits_of(robot: Robot, given: Mapping[str, Any] | None, learns_grip: bool) -> PlanLimits:
     """The limits of a plan; of wheels that slip, the grip of the file unless it is to be learnt.
 
     Raises InputError for another name, or what is no number above 0.
@@ -47,12 +47,12 @@ def limits_of(robot: Robot, given: Mapping[str, Any] | None, learns_grip: bool) 
     if mu is not None and not learns_grip:
         limits["traction"] = GRIP_SHARE * float(np.min(mu))
     for name, value in (given or {}).items():
-        if name not in Limits._fields:
-            raise InputError("no such limit", got=name, expected=", ".join(Limits._fields), where="limits")
+        if name not in PlanLimits._fields:
+            raise InputError("no such limit", got=name, expected=", ".join(PlanLimits._fields), where="limits")
         if not is_number(value) or not value > 0.0:
             raise InputError(f"no limit of {name}", got=value, expected="a number above 0", where="limits")
         limits[name] = float(value)
-    return Limits(**limits)
+    return PlanLimits(**limits)
 
 
 def strain(robot: Robot, run: Run, dt: float) -> Strain:

@@ -15,9 +15,9 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.problem.nuisances import PUSH, TILT
-from omnidyn.identification.planning.aims import NEXT, Aim, aim_of, fitted_keys, known_of
+from omnidyn.identification.planning.aims import NEXT, PlanAim, aim_of, fitted_keys, known_of
 from omnidyn.identification.planning.information import Prediction, information_of, told_by
-from omnidyn.identification.planning.limits import GRIP, Limits, limits_of
+from omnidyn.identification.planning.limits import GRIP, PlanLimits, limits_of
 from omnidyn.identification.planning.moves import FORWARD, RAMP, SIDEWAYS, STEP, TURN, PlannedMove, all_moves
 from omnidyn.identification.planning.planned import Plan, Predicted
 from omnidyn.identification.planning.recorded import Noise, driven, noise_of, recorded
@@ -43,7 +43,7 @@ SLOWEST, FASTEST = 5.0, 1000.0  # [Hz]
 DOUBTED = ("gain", "dead_band")  # what a fit may need beside the numbers of the file: moves must tell that apart too
 SEED = 0  # of the robots and of the noise
 REST = 1.0  # [s] before the first move
-VOLUME = Aim().score([])
+VOLUME = PlanAim().score([])
 
 
 def plan(
@@ -132,7 +132,7 @@ def plan_rest(
     What it promises is for the logs of both drives together. Raises as `plan`.
     """
     width, depth = _room(area)
-    planner = _planner(robot, 1.0 / rate, noise, _question(robot, tuple(promised), Aim()), {})
+    planner = _planner(robot, 1.0 / rate, noise, _question(robot, tuple(promised), PlanAim()), {})
     planner = replace(planner, driven=driven, promised=promised)
     return planner.that_tells().planned((width, depth), seconds / (1.0 - HELD_OUT_SHARE), progress)
 
@@ -165,9 +165,9 @@ class _Planner:
     dt: float
     noise: Noise
     question: OutputError
-    limits: Limits
+    limits: PlanLimits
     rolling: Robot
-    aim: Aim = field(default_factory=Aim)
+    aim: PlanAim = field(default_factory=PlanAim)
     driven: FloatArray | None = None  # and recorded already, as share of the largest input
     promised: Mapping[str, float] = field(default_factory=dict)  # half the interval of each number, as a share of it
 
@@ -231,7 +231,7 @@ class _Planner:
         turn = self._quarter_turn(candidates) if {TILT, PUSH} <= set(self.aim.nuisances) else None
         time -= 2.0 * turn.duration if turn else 0.0
         # what is best by the volume is often good for another aim: it is compared too
-        scores = list(dict.fromkeys((score, VOLUME) if self.aim != Aim() else (score,)))
+        scores = list(dict.fromkeys((score, VOLUME) if self.aim != PlanAim() else (score,)))
         count = SEARCHES_OF_REST if self.promised else SEARCHES
         question = self.question if self.promised else asked  # a promise is without doubts
         for k in range(count):
@@ -383,10 +383,10 @@ class _Planner:
         return recorded(robot, share, self.dt, self.noise, rng)
 
 
-def _no_plan(width: float, depth: float, left_out: Mapping[str, int], limits: Limits) -> InsufficientDataError:
+def _no_plan(width: float, depth: float, left_out: Mapping[str, int], limits: PlanLimits) -> InsufficientDataError:
     """That there is none, and what stands in its way most."""
     most = max(left_out, key=lambda why: left_out[why], default=ROOM)
-    if most in Limits._fields:
+    if most in PlanLimits._fields:
         return InsufficientDataError(
             f"no plan moves the robot visibly within the limit of {most}",
             got=f"{getattr(limits, most):.3g}",
@@ -423,7 +423,7 @@ def _robots(robot: Robot) -> list[Robot]:
         return list(sample(robot, DRAWS, SEED, factors=dict.fromkeys(keys, GUESS)))
 
 
-def _question(robot: Robot, free: Sequence[str] | None, aim: Aim) -> OutputError:
+def _question(robot: Robot, free: Sequence[str] | None, aim: PlanAim) -> OutputError:
     """What the fit of its log is asked. Of two explanations all numbers are free."""
     keys = None if free is None else tuple(key for name in free for key in map(str, expand(name, robot)))
     if aim.criterion == NEXT:

@@ -12,8 +12,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Points, Table, percent_cell, plain
 from omnidyn.identification.output_error.trust.cures import Blind
-from omnidyn.identification.planning.aims import NEXT, Aim
-from omnidyn.identification.planning.limits import Limits, strain
+from omnidyn.identification.planning.aims import NEXT, PlanAim
+from omnidyn.identification.planning.limits import PlanLimits, strain
 from omnidyn.identification.planning.moves import PlannedMove
 from omnidyn.identification.planning.recorded import driven
 from omnidyn.model.drive import DUTY
@@ -72,11 +72,11 @@ class Plan(Displayable):
     noise: Mapping[str, FloatArray]
     robots: int
     blind: tuple[Blind, ...] = ()
-    aim: Aim = field(default_factory=Aim)
+    aim: PlanAim = field(default_factory=PlanAim)
     apart: Mapping[str, float] = field(default_factory=dict)
     tried: int = 0
     left_out: Mapping[str, int] = field(default_factory=dict)
-    limits: Limits = field(default_factory=Limits)
+    limits: PlanLimits = field(default_factory=PlanLimits)
 
     @property
     def seconds(self) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.planning.aims import Score
-from omnidyn.identification.planning.limits import Limits, Strain, strain
+from omnidyn.identification.planning.limits import PlanLimits, Strain, strain
 from omnidyn.identification.planning.moves import PlannedMove
 from omnidyn.identification.planning.recorded import driven
 from omnidyn.model.robot import Robot
@@ -19,7 +19,7 @@ from omnidyn.model.robot import Robot
 LONGEST_REST, SPARE_REST = 2.0, 0.1  # [s] a robot that still moves then is asked for less; more than the slowest needs
 STANDS = np.array([2e-3, 2e-3, 1e-2])  # [m/s, m/s, rad/s] what is slower stands
 UNKNOWN = 3.0  # std of a number that nothing is known of, as a share of it
-ROOM, STILL = "room", "still"  # why a move is left out, beside "rest" and the names of Limits
+ROOM, STILL = "room", "still"  # why a move is left out, beside "rest" and the names of PlanLimits
 
 
 class TriedMove(NamedTuple):
@@ -33,7 +33,7 @@ class TriedMove(NamedTuple):
     strain: Strain
 
 
-def tried(move: PlannedMove, robots: Sequence[Robot], limits: Limits, dt: float) -> TriedMove:
+def tried(move: PlannedMove, robots: Sequence[Robot], limits: PlanLimits, dt: float) -> TriedMove:
     """What a move does with some robots, the first of them that of the file. It rests until all stand, and until its
     heat is within the limit."""
     rest = reach = 0.0
@@ -52,7 +52,7 @@ def tried(move: PlannedMove, robots: Sequence[Robot], limits: Limits, dt: float)
     return TriedMove(replace(move, rest=round(max(rest, 0.0) + SPARE_REST, 2)), reach, moved, stands, most)
 
 
-def fitting(moves: Sequence[TriedMove], border: float, limits: Limits) -> tuple[list[TriedMove], Counter[str]]:
+def fitting(moves: Sequence[TriedMove], border: float, limits: PlanLimits) -> tuple[list[TriedMove], Counter[str]]:
     """The moves that stay inside and within the limits, and why how many others do not."""
     kept, left_out = [], Counter[str]()
     for tried_move in moves:
@@ -64,7 +64,7 @@ def fitting(moves: Sequence[TriedMove], border: float, limits: Limits) -> tuple[
     return kept, left_out
 
 
-def _why_not(tried_move: TriedMove, border: float, limits: Limits) -> str:
+def _why_not(tried_move: TriedMove, border: float, limits: PlanLimits) -> str:
     """What speaks against a move; "" for nothing."""
     checks = {
         STILL: tried_move.moved,
