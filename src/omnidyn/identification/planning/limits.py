@@ -30,7 +30,7 @@ class PlanLimits(NamedTuple):
 
 
 class Strain(NamedTuple):
-    """What a run asks of a robot: current [A] and traction [-] at most, as in PlanLimits; energy [J]: in the windings of
+    """What a run asks of a robot: current [A] and traction [-] at most, as of a plan; energy [J]: in the windings of
     the hottest motor."""
 
     current: float
