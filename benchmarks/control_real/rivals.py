@@ -95,12 +95,13 @@ class KinematicPi:
         self.plant, self.sum = plant, np.zeros(3)
 
     def step(self, t: float, pose: FloatArray, twist: FloatArray, path: Any) -> FloatArray:
-        """Speeds of the wheels [rad/s]. Shape (wheels,)."""
+        """Speeds of the wheels [rad/s], NaN where the pose is. Shape (wheels,)."""
         motion = path.at(np.array([t, t + self.plant.latency + 0.5 * DT]))
         error = motion.pose[0] - pose
         error[2] = math.remainder(error[2], 2.0 * math.pi)
         wanted = to_body(pose[2]) @ (motion.velocity[1] + PI_GAIN * error + self.sum)
-        self.sum = np.clip(self.sum + PI_INTEGRAL * PI_GAIN**2 * error * DT, -MOST_PI_SUM, MOST_PI_SUM)
+        if np.isfinite(error).all():
+            self.sum = np.clip(self.sum + PI_INTEGRAL * PI_GAIN**2 * error * DT, -MOST_PI_SUM, MOST_PI_SUM)
         return self.plant.directions.T @ wanted / self.plant.radius
 
 
@@ -134,6 +135,8 @@ class LqrIntegral(Rival):
 class Behind:
     """A rival behind a filter of first order: speeds are added up, and a share of the error of each late pose.
 
+    Where a measurement is missing, the speeds before hold on.
+
     make: makes the rival for a plant. delay [s]: age of a pose when it arrives.
     """
 
@@ -143,11 +146,16 @@ class Behind:
         self.plant, self._rival, self._age = plant, make(plant), delay + 0.5 * DT
         self._believed: FloatArray | None = None
         self._seen, self._past = np.full(3, np.nan), list[tuple[float, FloatArray]]()
+        self._twist = np.zeros(3)
 
     def step(self, t: float, pose: FloatArray, twist: FloatArray, path: Any) -> FloatArray:
         """What the rival says of the pose that is believed."""
         if self._believed is None:
             self._believed = pose.copy()
+        if np.isfinite(pose).all() and np.isfinite(twist).all():
+            self._twist = twist
+        else:
+            pose, twist = self._seen, self._twist
         believed = self._believed + to_body(self._believed[2] + 0.5 * DT * twist[2]).T @ twist * DT
         self._past = [*self._past, (t, believed)][-self.KEPT :]
         if (pose != self._seen).any():

@@ -116,7 +116,10 @@ def random_numbers(seed: int) -> Numbers:
 
 def robot_of(name: str, numbers: Numbers) -> Robot:
     """What omnidyn is told of it: all but a weak motor and a battery that sags."""
-    if name in ("axebot", "lekiwi"):
+    if name == "lekiwi":
+        known = omnidyn.load_robot(name)
+        return known.replace(drive=known.drive.replace(ki=numbers["loop"][1]))
+    if name == "axebot":
         return omnidyn.load_robot(name)
     wheels = {"roller_angle_deg": numbers["roller"]} if "roller" in numbers else {}
     friction: dict[str, Any] = {}

@@ -7,9 +7,9 @@
 Names are imported on first use, so that `import omnidyn` costs nothing.
 
 Each room imports only from those before it. What all stand on: errors, progress, arguments, arrays, files, units,
-statistics, clocks; document, shown, statement and attempts (what results are made of, and what follows a fit); compiled
-(machine code). Then sensors, run, model, simulation, logs, findings (`check`), comparison, identification, control,
-campaigns; telling (their words), paper, report, export, interop. Skins: cli, studio.
+statistics, clocks; glossary, document, shown, statement and attempts (what results are made of, and what follows a
+fit); compiled (machine code). Then sensors, run, model, simulation, logs, findings (`check`), comparison,
+identification, control, driving, campaigns; telling (their words), paper, report, export, interop. Skins: cli, studio.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ _HOME = {
     "BatchRun": "omnidyn.simulation.batch.result",
     "Campaign": "omnidyn.campaigns.results",
     "Comparison": "omnidyn.comparison.result",
+    "DriveProgram": "omnidyn.driving.program",
+    "DriveRecord": "omnidyn.driving.record",
     "Estimate": "omnidyn.identification.estimate",
     "Identification": "omnidyn.identification.identification",
     "Live": "omnidyn.identification.live.live",
@@ -36,7 +38,9 @@ _HOME = {
     "OmnidynError": "omnidyn.errors",
     "OutputError": "omnidyn.identification.methods",
     "Robot": "omnidyn.model.robot",
+    "RobotConnection": "omnidyn.driving.connection",
     "Run": "omnidyn.run",
+    "SimulatedRobot": "omnidyn.driving.simulated",
     "SteadyState": "omnidyn.identification.methods",
     "Tracking": "omnidyn.control.tracking",
     "Tuned": "omnidyn.control.tune",
@@ -47,6 +51,7 @@ _HOME = {
     "confidence_band": "omnidyn.simulation.band",
     "dead_zone": "omnidyn.model.known.dead_zone",
     "drift": "omnidyn.comparison.drift",
+    "drive": "omnidyn.driving.drive",
     "feedforward_table": "omnidyn.control.table",
     "identify": "omnidyn.identification.identify",
     "load_campaign": "omnidyn.campaigns.results",
@@ -58,6 +63,7 @@ _HOME = {
     "preset_names": "omnidyn.model.robot_file",
     "read_commands": "omnidyn.logs.command_file",
     "read_log": "omnidyn.logs.read_log",
+    "read_program": "omnidyn.driving.program_file",
     "read_steady_table": "omnidyn.logs.steady_table",
     "sample": "omnidyn.simulation.batch.sample",
     "save_robot": "omnidyn.model.robot_file",
@@ -89,6 +95,12 @@ if TYPE_CHECKING:
     from omnidyn.control.table import feedforward_table
     from omnidyn.control.tracking import Tracking
     from omnidyn.control.tune import Tuned, tune
+    from omnidyn.driving.connection import RobotConnection
+    from omnidyn.driving.drive import drive
+    from omnidyn.driving.program import DriveProgram
+    from omnidyn.driving.program_file import read_program
+    from omnidyn.driving.record import DriveRecord
+    from omnidyn.driving.simulated import SimulatedRobot
     from omnidyn.errors import OmnidynError
     from omnidyn.findings.check import check
     from omnidyn.identification.estimate import Estimate

@@ -193,3 +193,12 @@ def test_with_the_load_of_the_log(call, tmp_path, offset):
         found[name] = robot["overall"]["vx"]["rmse"]
     assert found["with"] == pytest.approx(0.01, rel=0.15)
     assert found["without"] > 2.0 * found["with"]
+
+
+def test_two_robots_of_one_name_are_told_apart_by_their_files(call, tmp_path):
+    text = (tmp_path / "wrong.toml").read_text()
+    for name in ("before", "after"):
+        (tmp_path / f"{name}.toml").write_text(text)
+    code, out, _ = call("run.csv", "--robot", "before.toml", "--robot", "after.toml", "--json")
+    assert code == 0
+    assert set(json.loads(out)["robots"]) == {"before", "after"}

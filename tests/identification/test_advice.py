@@ -1,14 +1,17 @@
 """What to do next after a fit to whole logs: nothing that would undo something else that is asked for."""
 
+from pathlib import Path
+
 import numpy as np
 
 from omnidyn.identification.advice import advice
 from omnidyn.identification.estimate import Correlation
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.identification.output_error.prepare import guesses
 from omnidyn.identification.stability import Stability
 from omnidyn.model.robot import Prior
-from omnidyn.model.robot_file import load_robot
+from omnidyn.model.robot_file import load_robot, parse_robot
 from omnidyn.statement import quoted
 
 DISC = Remedy("friction.direction", quoted("friction along the direction of travel"), 0.5, 0.1, share=0.95, chi2=1000.0)
@@ -68,6 +71,17 @@ def test_of_remedies_that_explain_the_same_only_the_first_is_advised():
         "friction along the direction of travel would explain what the model leaves out: put friction.direction into "
         "the robot file, and fit again"
     ]
+
+
+def test_a_limit_becomes_a_guess_of_the_file_so_that_its_other_guesses_stay_free():
+    """With `free` the guesses of the file would be held: friction of 0 for 5.6 N on a robot of `init`."""
+    limit = Remedy("motor.current_limit_A", quoted("a current limit of about 2.8 A"), 0.5, 0.1, share=0.9, chi2=900.0)
+    (words,) = map(str, missing(limit))
+    how = 'current_limit_A = { value = .., origin = "guess" }'
+    assert words.endswith(f"put about that value into the robot file, {how}, and fit again")
+    text = (Path(__file__).parents[2] / "src/omnidyn/model/presets/axebot.toml").read_text("utf-8")
+    robot = parse_robot(text.replace("[motor]", '[motor]\ncurrent_limit_A = { value = 2.8, origin = "guess" }'))
+    assert guesses(robot) == ("motor.current_limit_A",)
 
 
 def test_what_the_logs_cannot_tell_apart_is_one_advice():

@@ -84,6 +84,9 @@ def export(
     height: float | None = typer.Option(
         None, metavar="M", help="Of the body [m], for its inertia about the other axes (mjcf, urdf, sdf)."
     ),
+    free_base: bool = typer.Option(
+        False, "--free-base", help="It falls and tips, in place of sliding in the plane (mjcf)."
+    ),
     log: list[str] = typer.Option(
         [], "--log", metavar="LOG", help="With wheel speeds and a measured twist, for covariances (ros2-control)."
     ),
@@ -126,6 +129,7 @@ def export(
         raise typer.BadParameter("-o - and --json both want stdout.")
     values = {"precision": precision or None, "fmi": fmi, "height": height, "horizon": horizon, "dt": dt}
     values |= {"controller": controller or None, "ticks_per_turn": ticks_per_turn, "force_guess": force_guess or None}
+    values |= {"free_base": free_base or None}
     options = _options(kind, make, values)
     if tol is not None:
         options |= {name: tol or None for name in _options(kind, make, {"tol": tol})}

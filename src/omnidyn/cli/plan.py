@@ -18,6 +18,7 @@ from omnidyn.cli.terminal.streams import say, to_json
 from omnidyn.cli.terminal.telling import as_json, tell
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
+from omnidyn.model.robot_file import robot_to_toml
 
 if TYPE_CHECKING:
     from omnidyn.identification.planning.planned import Plan
@@ -69,8 +70,13 @@ def plan(
     if out:
         for path, held_out in zip(files, (False, True), strict=False):
             _write(made, held_out, path, force)
+        program, check = (sha256(Path(path).read_bytes()).hexdigest() for path in files[:2])
         promised = as_json(
-            made.document(), provenance([source]), program_sha256=sha256(Path(out).read_bytes()).hexdigest()
+            made.document(),
+            provenance([source]),
+            program_sha256=program,
+            check_sha256=check,
+            robot_file=robot_to_toml(loaded),
         )
         write_atomic(files[-1], to_json(promised) + "\n", force)
     tell(made.document(), json, provenance([source]), output=out or None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,10 +11,10 @@ from omnidyn.arguments import Rng, check_order, seed_of
 from omnidyn.comparison.errors_from_start import errors_for_whiteness
 from omnidyn.comparison.metrics import Metrics, metrics
 from omnidyn.comparison.model_bands import with_bands
-from omnidyn.comparison.nearer_model import ModelDifference, difference
+from omnidyn.comparison.nearer_model import ModelDifference, changes, difference
 from omnidyn.comparison.replay import HOLD, Replay, choose_input, refuse_other_robot, replay
 from omnidyn.comparison.result import Comparison, Segment
-from omnidyn.comparison.traces import Trace, compared_components, counts_from_start, trace_of
+from omnidyn.comparison.traces import Trace, compared_components, counts_from_start, is_counted, trace_of
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
 from omnidyn.model.first_guess import rests_on
@@ -25,6 +26,7 @@ from omnidyn.sensors import PREDICTED, SHOWN
 from omnidyn.simulation.engine import TOLERANCE
 from omnidyn.statement import Statement
 
+EACH = 0.1  # [s] over which wheels turn, where two models are compared by angles
 ABSENT = Trace(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
@@ -196,11 +198,16 @@ def _by_segment(traces: Mapping[str, list[Trace]], channels: Sequence[str]) -> d
 def _differences(
     traces: Sequence[Mapping[str, list[Trace]]], channels: Sequence[str], seed: int
 ) -> dict[str, ModelDifference]:
+    """Which model is nearer in each component. An angle of a wheel counts from its start, and a free run wanders off:
+    one log is one piece, which could tell nothing. How far the wheel turns in each tenth of a second tells."""
     first, second = traces
-    pairs = (
-        (key, difference(first[key], second[key], len(channels), seed, whole=counts_from_start(key)))
-        for key in channels
-    )
+    pairs = []
+    for key in channels:
+        a, b, each_s = first[key], second[key], EACH if is_counted(key) else 0.0
+        if each_s:
+            a, b = ([changes(trace, each_s) for trace in side if len(trace.t)] for side in (a, b))
+        gap = difference(a, b, len(channels), seed, whole=counts_from_start(key) and not each_s)
+        pairs.append((key, gap and replace(gap, each_s=each_s)))
     return {key: gap for key, gap in pairs if gap is not None}
 
 

@@ -24,13 +24,15 @@ FEWEST_BLOCKS = 8  # blocks below which nothing can be told
 class ModelDifference:
     """rmse_difference: rmse of the first model minus that of the second, in the unit of the component; std_error: of
     that, None where there are too few independent stretches. better: 0 or 1 for the model that is surely better, None
-    where chance could have done it. blocks: how many independent stretches the samples are worth.
+    where chance could have done it. blocks: how many independent stretches the samples are worth. each_s: where changes
+    over so many seconds were judged, and these are the errors; 0 where the samples were.
     """
 
     rmse_difference: float
     std_error: float | None
     better: int | None
     blocks: int
+    each_s: float = 0.0
 
 
 def difference(
@@ -67,6 +69,13 @@ def difference(
     )
     margin = t_quantile(blocks - 2, 1.0 - 0.5 * ALPHA / tests) * spread
     return ModelDifference(gap, spread, (0 if gap < 0.0 else 1) if abs(gap) > margin else None, blocks)
+
+
+def changes(trace: Trace, each_s: float) -> Trace:
+    """How much a trace changes in each so many seconds [s]: what its start was off by is in none of it."""
+    rows = np.unique(np.searchsorted(trace.t, np.arange(trace.t[0], trace.t[-1] + 0.5 * each_s, each_s)))
+    rows = rows[rows < len(trace.t)]
+    return Trace(trace.t[rows[1:]], np.diff(trace.measured[rows]), np.diff(trace.model[rows]))
 
 
 def _midpoint_and_gap(first: Trace, second: Trace) -> FloatArray:

@@ -184,6 +184,10 @@ class Comparison(Displayable):
                 difference_table(self.robots, self.difference),
                 "",
             ]
+        if any(gap.each_s for gap in self.difference.values()):
+            parts.append(
+                "angles of wheels: nearer is the model that knows better how far they turn in each tenth of a second."
+            )
         parts += legend([metrics for scores in self.overall.values() for metrics in scores.values()])
         parts += ["currents are compared by size, without sign."] if self.current_unsigned else []
         parts.append(by_severity(self.warnings))

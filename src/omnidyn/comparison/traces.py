@@ -10,7 +10,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.comparison.replay import SET_SPEEDS
 from omnidyn.logs.channels import components, place, si_suffix
 from omnidyn.run import Run
-from omnidyn.sensors import FROM_START, PREDICTED
+from omnidyn.sensors import COUNTED, FROM_START, PREDICTED
 
 TURN = 2.0 * np.pi
 
@@ -80,6 +80,12 @@ def counts_from_start(component: str) -> bool:
     """Whether a component counts from where a piece begins: its level there was given to the model."""
     location = place(component)
     return location is not None and location[0] in FROM_START
+
+
+def is_counted(component: str) -> bool:
+    """Whether a component is an angle of a wheel, as encoders count it."""
+    location = place(component)
+    return location is not None and location[0] in COUNTED
 
 
 def unit(component: str) -> str:

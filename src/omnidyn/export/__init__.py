@@ -3,7 +3,7 @@
 contract: the contract of a kind, and Export, what it gives. kinds: which there are. features: what a robot may have,
 and what each kind does with it. spelling: numbers and names as the formats want them.
 robot_json: the robot itself. code/: steps and controllers as C, an FMU. feedforward/: kS, kV, kA.
-bodies/: MuJoCo, URDF, SDF. ros/: ROS 2.
+bodies/: MuJoCo, URDF, SDF. ros/: ROS 2. drives/: a program that a robot drives by itself.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ A kind does not decide for itself: `refuse` and `left_out` read this table, docs
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -361,9 +361,12 @@ def refuse_controller(kind: str, controller: str) -> None:
         )
 
 
-def left_out(kind: str, robot: Robot) -> tuple[str, ...]:
-    """What a kind cannot say of a robot, or says only partly: one line for each feature that the robot has."""
-    cells = ((feature, cell(kind, name)) for name, feature in FEATURES.items())
+def left_out(kind: str, robot: Robot, instead: Mapping[str, Cell] | None = None) -> tuple[str, ...]:
+    """What a kind cannot say of a robot, or says only partly: one line for each feature that the robot has.
+
+    instead: feature -> what an option of the kind makes of it.
+    """
+    cells = ((feature, (instead or {}).get(name, cell(kind, name))) for name, feature in FEATURES.items())
     return tuple(
         f"{feature.words}: {support.words}" for feature, support in cells if support.words and feature.has(robot)
     )

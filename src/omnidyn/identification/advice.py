@@ -29,7 +29,7 @@ def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[Stat
     """What to measure or to ask for next, gravest first."""
     held = [*_held(fit)] if fit_failure(fit, validation) is not None else []
     missing = [statement for statement in _missing(fit) if not held or statement.code != "try_ladder"]
-    statements = [*held, *_not_seen(fit), *missing, *_guesses(fit), *_together(fit), *_wide(fit)]
+    statements = [*held, *missing, *_not_seen(fit), *_guesses(fit), *_together(fit), *_wide(fit)]
     statements += [replace(statement, severity=NOTE) for statement in fit.robot.pose_lag_of_log]
     if validation is not None and validation.held_out is None:
         statements.append(Statement("hold_out_log", NOTE))

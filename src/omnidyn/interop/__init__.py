@@ -3,6 +3,7 @@
 dataframe: pandas and polars, of a Run, an Estimate, a Comparison. dataset: xarray. runs: a Run from any of these.
 systems: python-control. gymnasium: environments. kinds: which files of other tools are read as a robot; robot_json,
 urdf, mjcf: how; parts: a robot from masses and axles.
+lerobot: a robot of LeRobot as a connection of `drive`.
 mjcf_parts: what is read of a MuJoCo model.
 dataset: a Run as an xarray Dataset.
 """
@@ -13,6 +14,7 @@ import importlib
 from typing import Any
 
 _HOME = {
+    "LeRobotConnection": "omnidyn.interop.lerobot",
     "import_robot": "omnidyn.interop.kinds",
     "linear_system": "omnidyn.interop.systems",
     "nonlinear_system": "omnidyn.interop.systems",

@@ -67,6 +67,14 @@ HeadingNoise = Annotated[
     Annotated[float, number(0.0, NOISIEST)] | None,
     Field(alias="heading_noise_rad", description="std of the heading of a pose"),
 ]
+GyroNoise = Annotated[
+    Annotated[float, number(0.0, NOISIEST)] | None,
+    Field(alias="gyro_noise_rad_s", description="std of a sample of a gyroscope"),
+]
+GyroBias = Annotated[
+    Annotated[float, number(0.0, MOST_BIAS)] | None,
+    Field(alias="gyro_bias_rad_s", description="std of what a gyroscope shows at rest"),
+]
 
 
 class Sensors(Value):
@@ -88,14 +96,8 @@ class Sensors(Value):
         Field(alias="twist_filter_s", description="time constant of a low pass of the speeds"),
     ] = 0.0
     encoder_counts: EncoderCounts = None
-    gyro_noise: Annotated[
-        Annotated[float, number(0.0, NOISIEST)] | None,
-        Field(alias="gyro_noise_rad_s", description="std of a sample of a gyroscope"),
-    ] = None
-    gyro_bias: Annotated[
-        Annotated[float, number(0.0, MOST_BIAS)] | None,
-        Field(alias="gyro_bias_rad_s", description="std of what a gyroscope shows at rest"),
-    ] = None
+    gyro_noise: GyroNoise = None
+    gyro_bias: GyroBias = None
     pose_delay: Annotated[
         Annotated[float, number(0.0, LATEST_POSE)],
         Field(alias="pose_delay_s", description="age of a pose when it arrives"),
@@ -146,7 +148,8 @@ class LogEffects(Value):
     """gain: of the voltage. fade: share of it lost from the start of a run to its end, evenly. tilt: constant force
     along x and y of the room [N]: of the headings of the log, or as the robot stood when it began. push: constant force
     along x and y of the body [N] and about yaw [N m]. latency: of the channels. of: marks of the logs, see `log_mark`.
-    encoder_counts; pose_rate [Hz], pose_noise [m], heading_noise [rad]: of its counts and poses, as of `Sensors`.
+    encoder_counts; gyro_noise, gyro_bias [rad/s]; pose_rate [Hz], pose_noise [m], heading_noise [rad]: of its counts,
+    gyroscope and poses, as of `Sensors`.
     row [s]: from row to row; None: poses waited for none.
     """
 
@@ -164,6 +167,8 @@ class LogEffects(Value):
     ] = (0.0, 0.0, 0.0)
     latency: Lateness = Lateness()
     encoder_counts: EncoderCounts = None
+    gyro_noise: GyroNoise = None
+    gyro_bias: GyroBias = None
     pose_rate: PoseRate = None
     pose_noise: PoseNoise = None
     heading_noise: HeadingNoise = None
@@ -190,6 +195,9 @@ class LogEffects(Value):
         return ", ".join(parts + (["speeds that are means over a row"] if self.latency.averaged else []))
 
 
+SHOWN = ("encoder_counts", "gyro_noise", "gyro_bias", "pose_rate", "pose_noise", "heading_noise")  # as of `Sensors`
+
+
 def sensors_of(sensors: Sensors | None, log: LogEffects | None, drive: float) -> Sensors:
     """The sensors of a file, else what its fit found of its logs. drive: the latency of the robot [s].
 
@@ -200,7 +208,7 @@ def sensors_of(sensors: Sensors | None, log: LogEffects | None, drive: float) ->
     late = log.latency
     behind = 0.0 if late.position is None else float(late.position) - drive
     counted = late.averaged or late.wheel_angle is not None
-    shown = {name: getattr(log, name) for name in ("encoder_counts", "pose_rate", "pose_noise", "heading_noise")}
+    shown = {name: getattr(log, name) for name in SHOWN}
     found = Sensors(twist=MEAN if counted else INSTANTANEOUS, **shown)
     if log.row is not None:  # a pose waited for its row as it will wait for a step of the loop, which is not its delay
         behind -= 0.5 * found.pose_wait(log.row)

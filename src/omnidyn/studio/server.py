@@ -254,6 +254,6 @@ def _add_sockets(app: FastAPI, studio: Studio) -> None:
 def _take(driving: Driving, command: Any) -> None:
     """A command of a page, as far as it is one."""
     if isinstance(command, dict):
-        known = {name: command[name] for name in ("axes", "level", "offset", "set", "vary") if name in command}
-        if known:
-            driving.send(known)
+        fields = {name: command[name] for name in ("axes", "level", "offset", "set", "vary") if name in command}
+        if fields:
+            driving.send(fields)

@@ -115,8 +115,4 @@ SENTENCES = {
     "breakaway_kept": Sentence("{subject} stays at {level:.3g}: rows in motion do not show it"),
     "breakaway_from_rest": Sentence(_breakaway_from_rest),
     "holds_at_least": Sentence(_holds_at_least),
-    "slow_speeds_left_out": Sentence("{count} speeds below {share:.0%} of the fastest in their row were left out"),
-    "at_current_limit": Sentence(
-        "in {rows} rows a motor is at its current limit: the force there is that of the limit, not of eq (11)"
-    ),
 }

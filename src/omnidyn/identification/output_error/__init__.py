@@ -6,6 +6,6 @@ model in place of the robot), solve/ (to the minimum), trust/ (how sure), memory
 group begins with), joint (several groups as one problem), written_fit (which of several fits is written), combinations
 (of numbers that logs tell together only), conclusion and answer, and fit, which solves and answers.
 traded_numbers: numbers that trade with each other.
-numbers_of_logs: what of a fit belongs to the robot, what to its logs.
+numbers_of_logs: what of a fit belongs to the robot, what to its logs; sensors_of_logs: what these show of sensors.
 moved_axes: which axes moved.
 """

@@ -88,7 +88,8 @@ def conclude(
     robot = _with_levels(_robot(problem, values, std, open_names, data, bool(joint)), own_levels)
     none_told = latencies_like_zero(problem, values, uncertainty)
     on_time = np.where([p.name in none_told for p in problem.parameters], 0.0, values)
-    robot = with_nuisances(robot, problem, on_time, std, open_names, records, data)
+    noise = noise_of(solver, solution)
+    robot = with_nuisances(robot, problem, on_time, std, open_names, records, data, noise)
     late_notes = [Statement("latency_like_zero", NOTE, numbers={"latencies": none_told})] if none_told else []
     return OutputErrorEstimate(
         robot=_together(robot, problem.parameters, std, uncertainty, correlation.matrix),
@@ -115,7 +116,7 @@ def conclude(
             name: Nuisance(float(values[robot_count + j]), std[name], ci95[name], _unit(name))
             for j, name in enumerate(names[robot_count:])
         },
-        noise=noise_of(solver, solution),
+        noise=noise,
         unidentifiable=(*open_names, *endless),
         combinations=(*joint, *trades(problem, values, uncertainty, moving_axes)),
         log_alone=_log_alone(problem, values, exact or uncertainty, open_names, exact not in (None, uncertainty)),

@@ -12,13 +12,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.clocks import usual_step
 from omnidyn.identification.estimate import identified, printable
 from omnidyn.identification.methods import GAUSS, NU
 from omnidyn.identification.output_error.engines.driver import late_by
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.identification.output_error.sensors_of_logs import has_gyroscope, sensors_shown
 from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.model import keys
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN
@@ -28,7 +28,6 @@ from omnidyn.model.log_effects import Lateness, LogEffects, log_mark
 from omnidyn.model.robot import JOINT, WITH_THE_FIT, Prior, Robot
 from omnidyn.run import Run
 from omnidyn.sensors import COUNTED, OF_WHEELS
-from omnidyn.statistics import robust_std
 
 LATENCY_ERRORS = 2.0  # standard errors within which a latency is like none
 
@@ -61,13 +60,15 @@ def with_nuisances(
     open_names: Sequence[str],
     records: Sequence[Record],
     data: str,
+    noise: Mapping[str, float],
 ) -> Robot:
     """The fitted robot with the dead band and the latency that were fitted beside it, and with what its logs did.
 
-    std: of the parameters by name; open_names: those that the data do not determine, which only go with the others.
+    std: of the parameters by name; open_names: those that the data do not determine, which only go with the others;
+    noise: std of what the fit leaves of each column.
     """
-    angles = any(name in COUNTED for name, _ in problem.columns)
-    if problem.robot_count == len(problem.parameters) and not angles and robot.log is None:
+    shown = any(name in COUNTED for name, _ in problem.columns) or any(has_gyroscope(record.run) for record in records)
+    if problem.robot_count == len(problem.parameters) and not shown and robot.log is None:
         return robot
     value_by_name = {p.name: float(v) for p, v in zip(problem.parameters, values, strict=True)}
     seconds, slopes_of_latency = late_by(problem, values, problem.columns)
@@ -89,9 +90,11 @@ def with_nuisances(
         for name, prior in prior_by_key.items()
         if keys.Key.parse(name).get(robot.replace(drive=drive)) > 0.0
     }
-    robot = robot.replace(
-        drive=drive, priors=priors, log=_effects(value_by_name, latency_by_channel, drive_latency, records)
-    )
+    effects = _effects(value_by_name, latency_by_channel, drive_latency, records)
+    effects = effects.replace(**sensors_shown(records, robot.wheels, noise))
+    marks = tuple(log_mark(record.run) for record in records if record.run is not None)
+    log = None if effects == LogEffects() else effects.replace(of=marks)
+    robot = robot.replace(drive=drive, priors=priors, log=log)
     return with_priors(robot, prior_by_key)
 
 
@@ -114,61 +117,20 @@ def _effects(
     latency_by_channel: Mapping[str, float],
     drive_latency: float,
     records: Sequence[Record],
-) -> LogEffects | None:
-    """What the logs did; None where they did nothing."""
-    runs = [record.run for record in records if record.run is not None]
+) -> LogEffects:
+    """What the logs did."""
     latency = Lateness(
         **{name: other_latency for name, other_latency in latency_by_channel.items() if other_latency != drive_latency},
-        averaged=any(_added_up(run, latency_by_channel) for run in runs),
+        averaged=any(_added_up(record.run, latency_by_channel) for record in records if record.run is not None),
     )
     tilt, push = ([value_by_name.get(f"{kind}.{axis}", 0.0) for axis in AXES] for kind in (TILT, PUSH))
-    effects = LogEffects(
+    return LogEffects(
         gain=value_by_name.get(GAIN, 1.0),
         fade=value_by_name.get(FADE, 0.0),
         latency=latency,
         tilt=(tilt[0], tilt[1]),
         push=(push[0], push[1], push[2]),
-    ).replace(**_poses(runs), **_counts(records))
-    return None if effects == LogEffects() else effects.replace(of=tuple(log_mark(run) for run in runs))
-
-
-LEAST_POSES, LEAST_NOISE = 50, 1e-4  # [1], [m] std: poses with less are counted, or of a simulation
-LONGEST_STEP = 3.5  # usual steps from one pose to the next: what is longer is a gap
-
-
-def _poses(runs: Sequence[Run]) -> dict[str, float]:
-    """Rate and noise of new poses, and from row to row; nothing where there are few poses, or none that is noisy."""
-    seconds, thirds, rows_apart = [], [], []
-    for run in runs:
-        if run.pose is None:
-            continue
-        rows = np.isfinite(run.pose).all(axis=1)
-        t, poses = run.t[rows], run.pose[rows]
-        is_new = np.append(True, (np.diff(poses, axis=0) != 0.0).any(axis=1))[: len(t)]
-        t, poses = t[is_new], poses[is_new]
-        seconds.append(np.diff(t))
-        rows_apart.append(usual_step(run.t))
-        thirds.append(np.diff(np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])]), n=3, axis=0))
-    if sum(map(len, thirds)) < LEAST_POSES:
-        return {}
-    # What moves smoothly has small third differences; those of noise have sqrt(1 + 9 + 9 + 1) times its std.
-    std = [float(robust_std(column)) / np.sqrt(20.0) for column in np.concatenate(thirds).T]
-    place = float(np.sqrt(np.mean(np.square(std[:2]))))
-    if place < LEAST_NOISE:
-        return {}
-    steps = np.concatenate(seconds)
-    return {
-        "pose_rate": float(1.0 / np.mean(steps[steps <= LONGEST_STEP * np.median(steps)])),
-        "pose_noise": place,
-        "heading_noise": float(std[2]),
-        "row": float(np.median(rows_apart)),
-    }
-
-
-def _counts(records: Sequence[Record]) -> dict[str, float]:
-    """Counts in a turn of a wheel, where angles or speeds are taken as such; nothing elsewhere."""
-    ticks = [tick for record in records for tick in record.ticks if tick > 0.0]
-    return {"encoder_counts": float(2.0 * np.pi / np.median(ticks))} if ticks else {}
+    )
 
 
 def _added_up(run: Run, latency_by_channel: Mapping[str, float]) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,9 @@ from omnidyn.simulation.batch.sample import sample
 DRAWS, GUESS = 10, (0.7, 1.3)  # robots that may be meant; share of a number of which nothing is known
 ROOM_SHARE = 0.8  # of the way to the border: what a plan uses of it
 HELD_OUT_SHARE = 0.15  # of the time: a second program, to judge the fit by
-SEARCHES, KEPT = 8, 0.6  # plans that are compared whole; share of the moves that each of them may choose from
+SEARCHES, SEARCHES_OF_REST = 8, 24  # plans that are compared whole
+BEGUN_SHARE = 0.6  # of a ramp: one that was driven so far is not begun anew
+KEPT = 0.6  # of the moves: what each of them may choose from
 SMALLER = 0.8  # of the reach of a move, where a whole plan left the room
 ATTEMPTS = 4  # at a plan that stays inside
 SMALLEST_ROOM, LARGEST_ROOM = 0.1, 1000.0  # [m]
@@ -98,28 +100,38 @@ def plan(
         )
     dt = 1.0 / rate
     planner = _Planner(robot, _robots(robot), dt, noise_of(robot, dt, noise), _question(robot, free))
-    border = ROOM_SHARE * 0.5 * min(width, depth)
-    progress(Report("trying moves"))
-    moves = planner.tried()
-    for _ in range(ATTEMPTS):
-        fitting = [one for one in moves if one.reach <= border and one.moved]
-        try:
-            made = planner.search(fitting, seconds, aim, progress)
-        except InsufficientDataError:  # nothing that fits moves it so far that its sensors see it
-            break
-        progress(Report("driving it with robots that may be meant"))
-        reach = planner.reach((made.share, made.held_out))
-        if reach[0] < 0.5 * width and reach[1] < 0.5 * depth:
-            return planner.predicted(made, (width, depth), reach)
-        border *= SMALLER
-    raise InsufficientDataError(
-        "no plan moves the robot visibly and stays inside the room, for all robots that may be meant",
-        got=f"{width:g} m x {depth:g} m",
-        expected="a larger room, or a robot that is known better",
-        remedy="drive it by hand for a minute, slowly and both ways along each axis, and plan for what identify makes "
-        "of that log",
-        where="area",
+    return planner.planned((width, depth), seconds, aim, progress)
+
+
+def plan_rest(
+    robot: Robot,
+    driven: FloatArray,
+    seconds: float,
+    area: Sequence[float] = (3.0, 3.0),
+    *,
+    promised: Mapping[str, float],
+    noise: Mapping[str, Any] | None = None,
+    rate: float = 100.0,
+    progress: Progress = silent,
+) -> Plan:
+    """The rest of a plan whose drive was ended: what was driven counts, and what is left of the time is planned anew.
+
+    Args:
+        robot: As for `plan`.
+        driven: The input of what was driven and recorded, in rows of the plan, as share of the largest input.
+            Shape (rows, wheels).
+        seconds: That are left [s], for the program alone.
+        promised: Key -> half of the interval that the plan promised, as a share; all of them are to be reached.
+        area, noise, rate, progress: As for `plan`.
+
+    What it promises is for the logs of both drives together. Raises as `plan`.
+    """
+    width, depth = _room(area)
+    dt = 1.0 / rate
+    planner = _Planner(
+        robot, _robots(robot), dt, noise_of(robot, dt, noise), _question(robot, tuple(promised)), driven, promised
     )
+    return planner.that_tells().planned((width, depth), seconds / (1.0 - HELD_OUT_SHARE), "", progress)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +152,44 @@ class _Planner:
     dt: float
     noise: Noise
     question: OutputError
+    driven: FloatArray | None = None  # and recorded already, as share of the largest input
+    promised: Mapping[str, float] = field(default_factory=dict)  # half the interval of each number, as a share of it
+
+    def planned(self, area: tuple[float, float], seconds: float, aim: str, progress: Progress) -> Plan:
+        """A plan that stays inside the room, in so many seconds with the part that is held out."""
+        width, depth = area
+        border = ROOM_SHARE * 0.5 * min(width, depth)
+        progress(Report("trying moves"))
+        moves = self.tried()
+        for _ in range(ATTEMPTS):
+            fitting = [one for one in moves if one.reach <= border and one.moved]
+            try:
+                made = self.search(fitting, seconds, aim, progress)
+            except InsufficientDataError:  # nothing that fits moves it so far that its sensors see it
+                break
+            progress(Report("driving it with robots that may be meant"))
+            reach = self.reach((made.share, made.held_out))
+            if reach[0] < 0.5 * width and reach[1] < 0.5 * depth:
+                return self.predicted(made, area, reach)
+            border *= SMALLER
+        raise InsufficientDataError(
+            "no plan moves the robot visibly and stays inside the room, for all robots that may be meant",
+            got=f"{width:g} m x {depth:g} m",
+            expected="a larger room, or a robot that is known better",
+            remedy="drive it by hand for a minute, slowly and both ways along each axis, and plan for what identify "
+            "makes of that log",
+            where="area",
+        )
+
+    def that_tells(self) -> _Planner:
+        """The same without what was driven, where that tells nothing: it had hardly begun."""
+        if self.driven is None:
+            return self
+        try:
+            told_by([self._recorded(self.robot, self.driven, np.random.default_rng(SEED))], self.robot, self.question)
+        except InsufficientDataError:
+            return replace(self, driven=None)
+        return self
 
     def tried(self) -> list[TriedMove]:
         """All moves that end at rest, with the one that goes farthest of the robots beside that of the file."""
@@ -150,7 +200,7 @@ class _Planner:
 
     def search(self, moves: Sequence[TriedMove], seconds: float, aim: str, progress: Progress) -> _Programs:
         """The best of a few plans from these moves, each from a part of them, compared whole."""
-        opening = _opening(moves)
+        opening = self._left_of(_opening(moves))
         candidates = [one.move for one in moves]
         rng = np.random.default_rng(SEED)
         runs = [self._recorded(self.robot, move.both(self.robot, self.dt), rng) for move in candidates]
@@ -158,15 +208,21 @@ class _Planner:
         names, information = information_of(runs, self.robot, asked)
         score = self._score(names, aim)
         begun = information[[candidates.index(move) for move in opening]].sum(axis=0)
+        if self.driven is not None:
+            told_names, more = information_of([self._recorded(self.robot, self.driven, rng)], self.robot, asked)
+            places = [names.index(name) for name in told_names]  # a short drive tells nothing of some
+            begun[np.ix_(places, places)] += more[0]
         time = (1.0 - HELD_OUT_SHARE) * seconds - REST - sum(move.duration for move in opening)
         best, best_score = None, math.inf
-        for k in range(SEARCHES):
-            progress(Report("choosing moves", k, SEARCHES))
+        count = SEARCHES_OF_REST if self.promised else SEARCHES
+        for k in range(count):
+            progress(Report("choosing moves", k, count))
             kept = np.flatnonzero(rng.random(len(candidates)) < KEPT) if k else np.arange(len(candidates))
             order = [int(kept[i]) for i in chosen([candidates[j] for j in kept], information[kept], time, score, begun)]
             made = self._programs(opening, [candidates[j] for j in order], seconds)
-            predictions = told_by([self._recorded(self.robot, made.share, rng)], self.robot, asked)
-            of_plan = _of(predictions, aim)
+            question = self.question if self.promised else asked  # a promise is without doubts
+            predictions = told_by(self._logs(self.robot, made.share, rng), self.robot, question)
+            of_plan = _beside(predictions, self.promised) if self.promised else _of(predictions, aim)
             if best is None or of_plan < best_score:
                 best, best_score = made, of_plan
         assert best is not None
@@ -204,8 +260,8 @@ class _Planner:
     def predicted(self, made: _Programs, area: tuple[float, float], reach: tuple[float, float]) -> Plan:
         """The plan, with what the fit would say of its log for each robot that may be meant."""
         rng = np.random.default_rng(SEED)
-        predictions = [told_by([self._recorded(robot, made.share, rng)], robot, self.question) for robot in self.robots]
-        values = told_by([self._recorded(self.robot, made.share, rng)], self.robot, self.question, cures=True)
+        predictions = [told_by(self._logs(robot, made.share, rng), robot, self.question) for robot in self.robots]
+        values = told_by(self._logs(self.robot, made.share, rng), self.robot, self.question, cures=True)
         halves = {name: 2.0 * np.array([one.of(name) for one in predictions]) for name in values.names}
         predicted = {
             name: Predicted(float(value), float(np.median(halves[name])), float(halves[name].max()))
@@ -230,6 +286,17 @@ class _Planner:
             values.blind,
         )
 
+    def _left_of(self, opening: list[PlannedMove]) -> list[PlannedMove]:
+        """What of the opening was not driven yet, or only a little."""
+        durations = np.array([move.duration for move in opening])
+        enough = REST + np.cumsum(durations) - (1.0 - BEGUN_SHARE) * durations
+        seconds = 0.0 if self.driven is None else len(self.driven) * self.dt
+        return [move for move, end in zip(opening, enough.tolist(), strict=True) if end > seconds]
+
+    def _logs(self, robot: Robot, share: FloatArray, rng: np.random.Generator) -> list[Run]:
+        """The log of a program, and that of what was driven before."""
+        return [self._recorded(robot, rows, rng) for rows in (share, self.driven) if rows is not None]
+
     def _recorded(self, robot: Robot, share: FloatArray, rng: np.random.Generator) -> Any:
         return recorded(robot, share, self.dt, self.noise, rng)
 
@@ -238,6 +305,11 @@ def _of(predictions: Prediction, aim: str) -> float:
     """The score of a whole plan: less is better."""
     names = (aim,) if aim else predictions.names
     return float(np.mean([math.log(min(predictions.of(name), UNKNOWN)) for name in names]))
+
+
+def _beside(predictions: Prediction, promised: Mapping[str, float]) -> float:
+    """How far the widest interval is beyond what was promised: less is better."""
+    return max(predictions.of(name) / min(half, UNKNOWN) for name, half in promised.items())
 
 
 def _opening(moves: Sequence[TriedMove]) -> list[PlannedMove]:

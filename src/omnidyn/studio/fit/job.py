@@ -16,7 +16,7 @@ from omnidyn.errors import OmnidynError
 from omnidyn.identification.estimate import NOT_DETERMINED, Estimate
 from omnidyn.identification.fit_document import difference_table, number_table
 from omnidyn.identification.identification import Identification
-from omnidyn.identification.methods import OutputError, SteadyState
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.prepare import free_by_default, guesses
 from omnidyn.model.keys import EMF, ROTOR, TORQUE, Key, find_key, in_words, unit
@@ -99,7 +99,11 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
         "remedies": _remedies(result),
         **_free_runs(result, folder),
     }
-    shown["report"] = _write_report(result, request, folder / "report.html")
+    from omnidyn.report.identification_page import render_identification  # imported lazily: slow to load
+
+    page = render_identification(result, {**result.provenance, "command": request["command"]})
+    (folder / "report.html").write_text(page, "utf-8")
+    shown["report"] = True
     return shown
 
 
@@ -199,24 +203,6 @@ def _free_runs(result: Identification, folder: Path) -> dict[str, Any]:
     head *= bool(table)
     names = [name for pair in runs.values() for name in pair]
     return {"series": names, "runs": runs, "logs": {"head": head, "rows": table}}
-
-
-def _write_report(result: Identification, request: Mapping[str, Any], path: Path) -> bool:
-    """The page that `--report` writes; whether there is one."""
-    record = {"omnidyn": omnidyn.__version__, "command": request["command"], "inputs": []}
-    if isinstance(result.method, SteadyState) and result.study is not None:
-        from omnidyn.report.steady_page import render_study
-
-        study: Any = result.study
-        page = render_study(study, record, verdict=result.verdict, verdicts=result.verdicts)
-    elif isinstance(result.method, OutputError):
-        from omnidyn.report.fit_page import render_fit
-
-        page = render_fit(result, record)
-    else:
-        return False
-    path.write_text(page, "utf-8")
-    return True
 
 
 def free_keys(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:

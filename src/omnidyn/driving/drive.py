@@ -1,0 +1,187 @@
+"""drive: a program, sent to a robot row by row, while a guard watches what comes back."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable
+from contextlib import suppress
+
+from omnidyn.arguments import check_order
+from omnidyn.driving.clock import DriveClock, RealClock
+from omnidyn.driving.connection import Command, RobotConnection
+from omnidyn.driving.guard import DriveGuard, Limits
+from omnidyn.driving.program import DriveProgram
+from omnidyn.driving.record import DriveRecord
+from omnidyn.driving.recording import DriveRecording
+from omnidyn.progress import Progress, Report, silent
+from omnidyn.statement import WARNING, Statement
+
+ANSWERS_WITHIN = 3.0  # [s] for the first answer of a robot
+GREETING = 0.3  # [s] in which the line is tried before the first row
+REST = 0.5  # [s] that are recorded after the last row
+
+
+def drive(
+    program: DriveProgram,
+    connection: RobotConnection,
+    *,
+    limits: Limits | None = None,
+    clock: DriveClock | None = None,
+    held: Callable[[], bool] | None = None,
+    progress: Progress = silent,
+) -> DriveRecord:
+    """Drive a robot through a program, and record it.
+
+    It stops where the robot is silent, late, begins anew or has a clock that jumps; at the border of the room; where a
+    wheel does not turn as predicted or slips; where the supply is low; and where `held` says no. Ctrl-C stops it too.
+    No motor gets anything later than `limits.dead_man` after that: each command ends by itself, on the robot's side.
+
+    Args:
+        program: What is to be driven; `read_program` reads what `omnidyn plan` wrote.
+        connection: To the robot, such as `SimulatedRobot`.
+        limits: When to stop.
+        clock: Default: that of a simulated robot, else real time.
+        held: Whether a key that must be held down still is.
+        progress: Hears what is done.
+
+    >>> import omnidyn
+    >>> robot = omnidyn.load_robot("axebot")
+    >>> forward = [[0.0, 3.0, -3.0]] * 50 + [[0.0, 0.0, 0.0]] * 25
+    >>> program = omnidyn.DriveProgram(robot, 0.02, forward)
+    >>> print(program.legs[0].words)
+    forward 0.71 m
+    >>> omnidyn.drive(program, omnidyn.SimulatedRobot(robot)).is_complete
+    True
+    """
+    check_order("drive(program, connection)", (program, DriveProgram), (connection, object))
+    return _Driver(
+        program, connection, limits or Limits(), clock or _clock_of(connection), held or (lambda: True), progress
+    ).run()
+
+
+def _clock_of(connection: object) -> DriveClock:
+    return getattr(connection, "clock", None) or RealClock()
+
+
+class _Driver:
+    """One drive on its way."""
+
+    def __init__(
+        self,
+        program: DriveProgram,
+        connection: RobotConnection,
+        limits: Limits,
+        clock: DriveClock,
+        held: Callable[[], bool],
+        progress: Progress,
+    ) -> None:
+        self.program, self.connection, self.limits = program, connection, limits
+        self.clock, self.held, self.progress = clock, held, progress
+        self.recording, self.guard = DriveRecording(), DriveGuard(program, limits, 0.0)
+        self.session, self.number = secrets.randbelow(2**31 - 1) + 1, 0
+        self.rows, self.start, self.driven_at = 0, 0.0, float("-inf")
+        self.off = (0.0,) * program.robot.wheels.count
+
+    def run(self) -> DriveRecord:
+        """All of it; whatever ends it, the robot is stopped."""
+        stopped = None
+        try:
+            self.connection.open()
+            stopped = self._greet() or self._rows()
+            if stopped is None:
+                self._rest()
+        except KeyboardInterrupt:
+            stopped = Statement("drive_by_hand", WARNING)
+        except OSError as error:
+            stopped = Statement("drive_line_broke", WARNING, numbers={"error": str(error.strerror or error)})
+        finally:
+            self._stop()
+        run = self.recording.run(self.program.channel, self.program.source or self.program.robot.name)
+        return DriveRecord(self.program, run, self.rows, stopped, self.driven_at)
+
+    def _greet(self) -> Statement | None:
+        """Begin a session: the robot answers, and commands and answers take half of the dead-man time at the most: the
+        other half is theirs to act."""
+        began, dt, answered, slowest = self.clock.now(), self.program.dt, 0, 0.0
+        sent = {0: began}
+        for k in range(round(ANSWERS_WITHIN / dt)):
+            now = self.clock.now()
+            sent.setdefault(self.number, now)
+            self.connection.send(Command(self.session, self.number, now, 0.5 * self.limits.dead_man, self.off))
+            self.clock.sleep_until(began + (k + 1) * dt)
+            for measured in self.connection.receive():
+                if measured.session == self.session:
+                    answered = answered or k + 1
+                    slowest = max(slowest, self.clock.now() - sent.pop(measured.number, self.clock.now()))
+            self.number += answered > 0
+            if answered and k + 1 - answered >= round(GREETING / dt):
+                break
+        if not answered:
+            return Statement("drive_no_answer", WARNING, numbers={"seconds": ANSWERS_WITHIN})
+        if slowest > 0.5 * self.limits.dead_man:
+            numbers = {"seconds": slowest, "most": 0.5 * self.limits.dead_man}
+            return Statement("drive_slow_line", WARNING, numbers=numbers)
+        return None
+
+    def _rows(self) -> Statement | None:
+        """Row by row. A loop that is late goes on from there, and no row is left out."""
+        dt, inputs = self.program.dt, self.program.inputs.tolist()
+        self.start = due = self.clock.now()
+        self.guard = DriveGuard(self.program, self.limits, self.start)
+        for k, row in enumerate(inputs):
+            self.clock.sleep_until(due)
+            late = self.clock.now() - due
+            if late > 0.5 * dt:
+                self.start += late
+                self.guard.start += late
+            stopped = self._listen() or self._of_this_side(late)
+            if stopped is not None:
+                return stopped
+            self._send(tuple(row))
+            self.rows, due = k + 1, self.start + (k + 1) * dt
+            if k % round(1.0 / dt) == 0:
+                self.progress(Report("driving", k, len(inputs)))
+        return None
+
+    def _rest(self) -> None:
+        """What the robot does after the last row is recorded too."""
+        begin, dt = self.start + len(self.program.inputs) * self.program.dt, self.program.dt
+        for k in range(round(REST / dt)):
+            self.clock.sleep_until(begin + k * dt)
+            self._listen()
+            self._send(self.off)
+
+    def _listen(self) -> Statement | None:
+        """Take what came, and say why to stop."""
+        now = self.clock.now()
+        for measured in self.connection.receive():
+            fault = self.guard.clock_fault(now, measured)
+            if fault is not None:
+                return fault
+            self.recording.measured(now, measured)
+            self.guard.take(now, self.recording.time_of(measured), measured)
+        return self.guard.fault(now)
+
+    def _of_this_side(self, late: float) -> Statement | None:
+        """A key that was released, and a loop that was held up."""
+        if not self.held():
+            return Statement("drive_released", WARNING)
+        if late > self.limits.dead_man:
+            return Statement("drive_slow_loop", WARNING, numbers={"seconds": late})
+        return None
+
+    def _send(self, inputs: tuple[float, ...]) -> None:
+        now = self.clock.now()
+        command = Command(self.session, self.number, now, 0.5 * self.limits.dead_man, inputs)
+        self.connection.send(command)
+        self.recording.sent(now, command)
+        self.guard.sent(now, self.number)
+        self.number += 1
+        if any(inputs):
+            self.driven_at = now
+
+    def _stop(self) -> None:
+        """Motors off, whatever the line makes of it: what was sent ends by itself."""
+        for end in (self.connection.stop, self.connection.close):
+            with suppress(OSError):
+                end()

@@ -1,0 +1,164 @@
+"""When a drive must stop: what is measured beside what the program leads to."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.driving.connection import Measured
+from omnidyn.driving.odometry import Odometry
+from omnidyn.driving.program import DriveProgram
+from omnidyn.statement import WARNING, Statement
+
+WINDOW = 0.3  # [s] of travel that is compared
+FOLLOWS_WITHIN = 0.2  # [s] later than predicted, at the latest
+MOVING = 0.25  # of the longest travel of a wheel in a window of the program: less is not judged
+FOLLOWS = 0.2  # of the predicted travel: a wheel that turns less does not follow
+SLIPS = 0.5  # of the travel: by so much wheels and body may differ
+LEAST_SUPPLY = 0.75  # of the supply in the robot file
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When to stop.
+
+    dead_man [s]: no motor gets anything longer than that after a stop, or after the line broke. silence [s]: without a
+    measurement. supply [V]: the least; default: 0.75 of that in the robot file.
+    """
+
+    dead_man: float = 0.25
+    silence: float = 0.25
+    supply: float | None = None
+
+
+class DriveGuard:
+    """Watches a drive: `sent` and `take` say what happened, `fault` whether to stop now.
+
+    start: of the program, on the clock of the drive [s], which all times here are on.
+    """
+
+    def __init__(self, program: DriveProgram, limits: Limits, start: float) -> None:
+        self.program, self.limits, self.start = program, limits, start
+        self.odometry = Odometry(program.robot)
+        self._first_fault: Statement | None = None
+        self._heard = start
+        self._last: Measured | None = None
+        self._unanswered = deque[tuple[int, float]]()
+        self._travel = {"encoders": _Travel(), "body": _Travel()}
+        speed = np.asarray(program.predicted.wheel_speed)
+        self._predicted = np.zeros_like(speed)
+        np.cumsum(0.5 * program.dt * (speed[1:] + speed[:-1]), axis=0, out=self._predicted[1:])
+        self._back = max(round(WINDOW / program.dt), 1)
+        self._judged = MOVING * np.abs(self._way(np.arange(len(speed)))).max(axis=0)
+        supply = program.robot.drive.supply
+        self._least_supply = limits.supply or (LEAST_SUPPLY * supply if supply else 0.0)
+
+    def sent(self, now: float, number: int) -> None:
+        """A command was sent."""
+        self._unanswered.append((number, now))
+
+    def take(self, now: float, t: float, measured: Measured) -> None:
+        """What came now, and was measured at t. The first fault counts."""
+        self._first_fault = self._first_fault or self._of_supply(measured)
+        while self._unanswered and self._unanswered[0][0] <= measured.number:
+            self._unanswered.popleft()
+        self._last, self._heard = measured, now
+        self.odometry.take(t, measured.channels)
+        for name, travel in self._travel.items():
+            travel.add(t, getattr(self.odometry, name))
+
+    def fault(self, now: float) -> Statement | None:
+        """Why to stop now; None for nothing."""
+        return self._first_fault or self._of_line(now) or self._of_place() or self._of_wheels()
+
+    def clock_fault(self, now: float, measured: Measured) -> Statement | None:
+        """A robot that began anew, or whose clock jumped."""
+        before = self._last
+        if before is None:
+            return None
+        if measured.session != before.session or measured.number < before.number:
+            return _stop("drive_reset")
+        jump = (measured.t - before.t) - (now - self._heard)
+        return _stop("drive_clock", jump=jump) if abs(jump) > self.limits.silence else None
+
+    def _of_supply(self, measured: Measured) -> Statement | None:
+        supply = float(measured.channels["supply"][0]) if "supply" in measured.channels else np.inf
+        return _stop("drive_supply", volts=supply, least=self._least_supply) if supply < self._least_supply else None
+
+    def _of_line(self, now: float) -> Statement | None:
+        """Silence, and commands that do not arrive."""
+        if now - self._heard > self.limits.silence:
+            return _stop("drive_silent", seconds=now - self._heard)
+        is_heard = now - self._heard < 0.5 * self.limits.silence  # else it is silence, if it lasts
+        if is_heard and self._unanswered and now - self._unanswered[0][1] > self.limits.dead_man:
+            return _stop("drive_late", seconds=now - self._unanswered[0][1])
+        return None
+
+    def _of_place(self) -> Statement | None:
+        """The border: where it will be when the motors are off."""
+        ahead = self.odometry.place[:2] + self.limits.dead_man * self.odometry.speed
+        for axis, place, size in zip("xy", ahead.tolist(), self.program.area, strict=True):
+            if abs(place) > 0.5 * size:
+                return _stop("drive_border", axis, place=place, border=0.5 * size)
+        return None
+
+    def _of_wheels(self) -> Statement | None:
+        """Wheels that do not turn as predicted, and a body that does not go as its wheels."""
+        went = {name: turned for name, travel in self._travel.items() if (turned := travel.turned()) is not None}
+        if not went:
+            return None
+        if len(went) == 2:
+            apart = np.abs(went["encoders"] - went["body"])
+            far = np.maximum(np.abs(went["encoders"]), np.abs(went["body"]))
+            slips = np.flatnonzero(apart > SLIPS * np.maximum(far, 2.0 * self._judged))
+            if slips.size:
+                return _stop("drive_slip", wheel=int(slips[0]) + 1)
+        turned = next(iter(went.values()))
+        row = round((self._travel[next(iter(went))].time - self.start) / self.program.dt)
+        rows = np.arange(row - round(FOLLOWS_WITHIN / self.program.dt), row + 1)
+        wanted = self._way(np.clip(rows, 0, len(self._predicted) - 1))
+        one_way = np.abs(np.sign(wanted).sum(axis=0)) == len(rows)
+        least = np.abs(wanted).min(axis=0) * np.sign(wanted[-1])
+        along = turned * np.sign(least)
+        bad = np.flatnonzero(one_way & (np.abs(least) > self._judged) & (along < FOLLOWS * np.abs(least)))
+        if not bad.size:
+            return None
+        wheel = int(bad[np.argmin(along[bad])])
+        code = "drive_wrong_way" if along[wheel] < -FOLLOWS * abs(least[wheel]) else "drive_stuck"
+        return _stop(code, wheel=wheel + 1)
+
+    def _way(self, rows: np.ndarray) -> FloatArray:
+        """How far each wheel turns in the window before these rows, as predicted [rad]. Shape (rows, wheels)."""
+        return self._predicted[rows] - self._predicted[np.maximum(rows - self._back, 0)]
+
+
+class _Travel:
+    """How far wheels turned over the last WINDOW."""
+
+    def __init__(self) -> None:
+        self._rows = deque[tuple[float, FloatArray]]()
+
+    def add(self, t: float, angle: FloatArray | None) -> None:
+        if angle is None or (self._rows and angle is self._rows[-1][1]):
+            return
+        self._rows.append((t, angle))
+        while len(self._rows) > 2 and t - self._rows[1][0] >= WINDOW:
+            self._rows.popleft()
+
+    @property
+    def time(self) -> float:
+        """Of the last angle."""
+        return self._rows[-1][0]
+
+    def turned(self) -> FloatArray | None:
+        """None while it was not watched that long."""
+        if not self._rows or self._rows[-1][0] - self._rows[0][0] < 0.9 * WINDOW:
+            return None
+        return self._rows[-1][1] - self._rows[0][1]
+
+
+def _stop(code: str, subject: str = "", **numbers: float) -> Statement:
+    return Statement(code, WARNING, subject, numbers)

@@ -1,0 +1,77 @@
+"""What was sent and what was measured, as a log: on the clock of the drive, each input from when it was sent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.driving.connection import Command, Measured
+from omnidyn.run import Run
+from omnidyn.sensors import CHANNELS, SCALAR
+
+TICK = 1e-6  # [s]: times that are nearer are one row
+
+
+class DriveRecording:
+    """Inputs and measurements of a drive, as they come."""
+
+    def __init__(self) -> None:
+        self._sent: list[tuple[float, tuple[float, ...]]] = []
+        self._measured: list[Measured] = []
+        self._difference = (
+            np.inf
+        )  # of the clock of the drive and that of the robot: of the measurement that came fastest
+
+    def sent(self, now: float, command: Command) -> None:
+        """A command that was sent."""
+        self._sent.append((now, command.inputs))
+
+    def measured(self, now: float, measured: Measured) -> None:
+        """A measurement that came; those before the first command are kept, and left out of the log."""
+        self._difference = min(self._difference, now - measured.t)
+        self._measured.append(measured)
+
+    def time_of(self, measured: Measured) -> float:
+        """When it was measured, on the clock of the drive, as far as the line lets it be known."""
+        return measured.t + self._difference
+
+    def run(self, channel: str, source: str) -> Run | None:
+        """The log; None where nothing was driven. channel: of the inputs."""
+        if len(self._sent) < 2:
+            return None
+        start = self._sent[0][0]
+        sent = _ticks([t - start for t, _ in self._sent])
+        measured = _ticks([self.time_of(one) - start for one in self._measured])
+        kept = (measured >= 0) & (measured >= np.maximum.accumulate(measured))
+        ticks = np.unique(np.concatenate([sent, measured[kept]]))
+        inputs = np.array([values for _, values in self._sent])
+        rows: dict[str, Any] = {channel: inputs[np.searchsorted(sent, ticks, side="right") - 1]}
+        found = [(int(tick), one) for tick, one, keep in zip(measured, self._measured, kept, strict=True) if keep]
+        for name in dict.fromkeys(name for _, one in found for name in one.channels):
+            values = [(tick, one.channels[name]) for tick, one in found if name in one.channels]
+            rows[name] = _column(name, values, ticks)
+        if channel == "duty" and "supply" in rows:
+            rows["supply"] = _held(rows["supply"])
+        return Run(t=ticks * TICK, source=source, **rows)
+
+
+def _ticks(times: Sequence[float]) -> np.ndarray:
+    return np.rint(np.array(times, dtype=float) / TICK).astype(np.int64)
+
+
+def _column(name: str, values: list[tuple[int, FloatArray]], ticks: np.ndarray) -> FloatArray:
+    """A channel on the rows of the log, NaN where it was not measured."""
+    width = len(values[0][1])
+    rows = np.full((len(ticks), width), np.nan)
+    rows[np.searchsorted(ticks, [tick for tick, _ in values])] = [value for _, value in values]
+    return rows[:, 0] if CHANNELS[name] == SCALAR else rows
+
+
+def _held(values: FloatArray) -> FloatArray:
+    """Each value until the next one; the first one before it too."""
+    finite = np.flatnonzero(np.isfinite(values))
+    places = np.maximum(np.searchsorted(finite, np.arange(len(values)), side="right") - 1, 0)
+    return values[finite[places]]

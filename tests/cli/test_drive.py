@@ -1,0 +1,89 @@
+"""omnidyn drive: a simulated robot, a stop, the rest, files, and what it does not take."""
+
+import json
+
+import numpy as np
+import pytest
+
+import omnidyn
+
+ROWS = [[0.0, 0.0, 0.0]] * 20 + [[0.0, 3.0, -3.0]] * 40 + [[0.0] * 3] * 20 + [[0.0, -3.0, 3.0]] * 40 + [[0.0] * 3] * 20
+
+
+@pytest.fixture
+def commands(here):
+    """There and back, as a command file without a plan."""
+    omnidyn.write_run(omnidyn.Run(t=0.02 * np.arange(len(ROWS)), voltage=ROWS), "rows.csv")
+    return "rows.csv"
+
+
+def test_a_simulated_robot_is_driven_and_recorded(call, here, commands):
+    code, out, err = call("drive", commands, "--robot", "axebot", "-o", "log.csv")
+    assert code == 0
+    assert out.startswith("Axebot drove the whole program: 2 legs in 2.8 s.")
+    assert "forward 0.56 m" in out
+    assert "wrote log.csv" in err
+    log = omnidyn.read_log(here / "log.csv", robot=omnidyn.load_robot("axebot"))
+    np.testing.assert_allclose(np.asarray(log.voltage)[:139], ROWS[:139], atol=1e-12)
+    assert log.wheel_speed is not None
+
+
+def test_a_dry_run_sends_and_writes_nothing(call, here, commands):
+    code, out, _ = call(
+        "drive", commands, "--robot", "axebot", "--to", "serial:/dev/none", "--dry-run", "-o", "log.csv"
+    )
+    assert (code, (here / "log.csv").exists()) == (0, False)
+    assert out.startswith("2 legs in 2.8 s for axebot: up to 0.56 m along x and 0.00 m along y, in 3 m x 3 m.")
+    code, out, _ = call("drive", commands, "--robot", "axebot", "--dry-run", "--json")
+    legs = json.loads(out)["legs"]
+    assert [leg["words"] for leg in legs] == ["forward 0.56 m", "back 0.56 m"]
+
+
+def test_the_border_of_a_small_room_stops_it(call, here, commands):
+    code, out, _ = call("drive", commands, "--robot", "axebot", "--area", "0.4x0.4", "-o", "log.csv")
+    assert code == 4
+    assert "the border is at 0.20 m" in " ".join(out.split())
+    assert "put it back into the middle" in " ".join(out.split())
+
+
+def test_what_is_left_is_driven(call, here):
+    omnidyn.write_run(omnidyn.Run(t=0.02 * np.arange(3 * len(ROWS)), voltage=ROWS * 3), "rows.csv")
+    robot = omnidyn.load_robot("axebot")
+    stopped = omnidyn.Run(t=0.02 * np.arange(200), voltage=(ROWS * 3)[:200], twist=np.zeros((200, 3)))  # in leg 3
+    omnidyn.write_run(stopped, "log.csv")
+    omnidyn.save_robot(robot, "mine.toml")
+    code, out, _ = call("drive", "rows.csv", "--robot", "mine.toml", "--resume", "log.csv", "-o", "rest.csv")
+    assert code == 0
+    assert out.startswith("Axebot drove the whole program: 4 legs in 5.7 s.")
+    code, _, err = call("drive", "rows.csv", "--robot", "mine.toml", "--resume", "log.csv", "--resume", "rest.csv")
+    assert code == 4
+    assert "nothing is left to drive" in err
+
+
+@pytest.mark.parametrize("kind", ["csv", "page", "arduino", "ros2", "ftc", "wpilib"])
+def test_files_are_written(call, here, commands, kind):
+    out = {"csv": "again.csv", "page": "page.html"}.get(kind, kind)
+    code, told, _ = call("drive", commands, "--robot", "axebot", "--to", kind, "-o", out)
+    assert code == 0
+    assert (here / out).exists()
+    assert f"axebot as {kind}" in told
+    code, _, _ = call("drive", commands, "--robot", "axebot", "--to", kind, "-o", out)
+    assert code == 3  # it is there
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["rows.csv"], "no robot to drive it; got no rows.json beside it"),
+        (["rows.csv", "--robot", "axebot", "--to", "udp:10.0.0.1:99"], "nowhere to record the drive"),
+        (["rows.csv", "--robot", "axebot", "--to", "moon", "-o", "l.csv"], "not a robot to send to"),
+        (["rows.csv", "--robot", "axebot", "--area", "3"], "not the size of a room"),
+        (["rows.csv", "--robot", "lekiwi"], "not what the drive takes"),
+        (["rows.csv", "--robot", "axebot", "--hold", "--to", "udp:127.0.0.1:9", "-o", "l.csv"], "no key can be held"),
+        (["none.csv", "--robot", "axebot"], "none.csv"),
+    ],
+)
+def test_what_it_does_not_take(call, here, commands, arguments, words):
+    code, _, err = call("drive", *arguments)
+    assert code == 3
+    assert words in err
