@@ -25,7 +25,6 @@ NAMES = {
     "simulate": "one robot, 10 s at 1 kHz: time and error beside scipy's LSODA with tanh friction",
     "inductance": "what winding inductance costs: exact engine with L > 0 beside L = 0, 10 s at 1 kHz",
     "rest": "60 s inside the dead zone: the robot must not move at all",
-    "plant": "implicit engine: cost of a step, iterations of the solver, error against cost beside scipy and MuJoCo",
     "environments": "65,536 environments: steps a second, checkers, a million steps beside plain Python (3 minutes)",
     "campaigns": "shards beside the batch kernel, a million closed loops, overhead of a shard on Dask (five minutes)",
     # logs
@@ -36,9 +35,7 @@ NAMES = {
     "fuzz_readers": "every reader on mutated and random bytes, 60 s each: only errors of omnidyn may leave it",
     "stagger": "topics with clocks of their own: check, geometry and fits beside equal stamps (two minutes)",
     # identification
-    "steady": "steady-state identification: real logs beside their README; coverage on simulated ones (3 minutes)",
     "floors": "changes of friction inside a run: how many are named, of one floor too, beside two halves (a minute)",
-    "large": "identify on three logs of 40 s at 200 Hz, four wheels, 12 channels: time, memory (ten minutes)",
     "laws_identified": "Stribeck, Dahl, LuGre fitted back from logs of other integrators: coverage, std (an hour)",
     "laws_ladder": "Stribeck, LuGre, slip under a plain file: found, named, taken by the ladder, held (40 minutes)",
     "groups": "two floors in one likelihood: coverage of their differences, bootstrap over runs (two minutes)",
@@ -58,14 +55,12 @@ NAMES = {
     # real
     "real_fit": "output error on real logs: the motor bench and udea, fitted on some runs, run on others",
     # control
-    "control": "tracking on the eight references of the peers, seven conditions, every controller (three minutes)",
     "control_plants": "tracking of richer robots: identified numbers beside those of a data sheet (two minutes)",
     "control_mismatch": "the same with wrong friction, payload, slip, jumps, missing samples, latency (a minute)",
     "control_gains": "LeKiwi under 20 gains of its speed loop, beside a PI of the pose (a minute)",
     "control_chain": "log, identify, track on these plants: a guessed robot beside the fitted one (two minutes)",
     "control_casadi": "the predictive controller beside CasADi with IPOPT on these plants (a minute)",
     "tune": "what tune finds, on an independent plant: errors before and after, three robots and sensors (15 minutes)",
-    "mpc": "the predictive controller: a step beside others' in the same run, cold starts, tracking, C (8 minutes)",
     # export
     "exports": "the paper's robot in C, FMU, MuJoCo, python-control, WPILib: errors, drift at rest (a minute)",
     "exported_c": "exported C on a million random calls under sanitizers: findings, the slowest call (four minutes)",

@@ -1,6 +1,7 @@
 """Words of the trade are explained where they occur, and nowhere else."""
 
-from omnidyn.document import Document, Table, explained
+from omnidyn.document import Document, Table
+from omnidyn.glossary import explained
 
 
 def test_only_what_occurs_is_explained():

@@ -1,3 +1,3 @@
-"""Closed loops: control and control_plants on the models here; control_chain, control_mismatch, control_casadi, tune on
-the plants of benchmarks/control_real; mpc with mpc_c (exported), mpc_peers (other solvers), araujo (an MPC of others).
+"""Closed loops: control_plants on the models here; control_chain, control_mismatch, control_casadi and tune on those of
+benchmarks/control_real.
 """

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 import omnidyn
-from benchmarks.control.control import mean
 from benchmarks.table import Table, machine
 from omnidyn.control.circumstances import Circumstances
 from omnidyn.control.closed_loop import told_of_loop, tracked
@@ -105,6 +104,11 @@ def errors(known: Robot, plant: Robot, name: str, options: dict[str, Any]) -> li
     return found
 
 
+def geometric_mean(values: list[float]) -> float:
+    """The exponential of the mean of the logarithms."""
+    return float(np.exp(np.mean(np.log(values))))
+
+
 def measure() -> Table:
     """A row per controller and robot."""
     columns = ["controller", "robot", "identified mm", "data sheet mm", "ratio"]
@@ -117,7 +121,9 @@ def measure() -> Table:
             [log_of(plant, seed)], guessed(plant), omnidyn.OutputError(free=["friction", *more])
         ).robot
         for name, options in shown.items():
-            own, sheet = (mean(errors(each, plant, name, options)) for each in (model, data_sheet(plant, seed)))
+            own, sheet = (
+                geometric_mean(errors(each, plant, name, options)) for each in (model, data_sheet(plant, seed))
+            )
             ratios.setdefault(name, []).append(own / sheet)
             cells: dict[str, Any] = {
                 "identified mm": f"{own:.3g}",

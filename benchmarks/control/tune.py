@@ -1,7 +1,7 @@
 """What `tune` finds, on a plant that shares no code with its own: the cells of `control_real`, before and after.
 
 Tuned as a user would: the robot of the file, its sensors, all else by default. A line is met where the cells of push
-are better in the geometric mean, and those of the other paths no worse than ALLOWED.
+are better in the geometric mean, those of the other paths no worse than ALLOWED, and outputs may act LEAST_DELAY later.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from omnidyn.control.controllers import ControllerFile
 
 CONTROLLERS = ("mpc", "pid")
 SENSORS = {"instantaneous": "instantaneous", "encoder": "encoder:{0}", "camera": "encoder:{0},pose:60Hz,40ms"}
+LEAST_DELAY = 15.0  # [ms] of delay margin
 ALLOWED = 1.1  # times the start, of a mean over the paths that are not pushed
 
 
@@ -38,7 +39,19 @@ def times_less(before: FloatArray, after: FloatArray) -> float:
 
 def measure() -> Table:
     """A row per robot, sensors and controller."""
-    columns = ["robot", "sensors", "controller", "tried", "seconds", "simulated", "free", "pushed", "kept", *paths()]
+    columns = [
+        "robot",
+        "sensors",
+        "controller",
+        "tried",
+        "seconds",
+        "simulated",
+        "free",
+        "pushed",
+        "kept",
+        "delay ms",
+        *paths(),
+    ]
     table = Table("tune: mm / mrad on an independent plant, before > after", columns, notes=[machine()])
     for controller in CONTROLLERS:
         for name, numbers in NUMBERS.items():
@@ -49,14 +62,15 @@ def measure() -> Table:
                 took = time.process_time() - start
                 before = cells(name, numbers, kind, ControllerFile(controller, tuned.start))
                 after = cells(name, numbers, kind, tuned.controller) if tuned.better else before
+                delay = 1e3 * tuned.margins.delay
                 free, pushed = times_less(before[:-1], after[:-1]), times_less(before[-1:], after[-1:])
                 words = {
                     path: f"{b[0]:.2f}/{b[1]:.2f} > {a[0]:.2f}/{a[1]:.2f}"
                     for path, b, a in zip(paths(), before, after, strict=True)
                 }
                 table.add(
-                    f"free <= {ALLOWED:g}, pushed <= 1",
-                    free <= ALLOWED and pushed <= 1.0,
+                    f"free <= {ALLOWED:g}, pushed <= 1, delay >= {LEAST_DELAY:g} ms",
+                    free <= ALLOWED and pushed <= 1.0 and delay >= LEAST_DELAY,
                     robot=name,
                     sensors=kind,
                     controller=controller,
@@ -66,6 +80,7 @@ def measure() -> Table:
                     free=f"{free:.2f}",
                     pushed=f"{pushed:.2f}",
                     kept="" if tuned.better else "start",
+                    **{"delay ms": f"{delay:.0f}"},
                     **words,
                 )
     return table

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.real import real_loop, real_nuisances, udea
+from benchmarks.real.choose_motor import choose_motor
 from benchmarks.table import Table, machine
 from omnidyn.identification.methods import AUTO
 from omnidyn.identification.motors.choice import fit_rmse, run_motor
-from omnidyn.identification.motors.choose_motor import choose_motor
 from omnidyn.identification.motors.estimate import MotorEstimate
 from omnidyn.identification.motors.fit import fit_motor
 from omnidyn.identification.motors.input_between_rows import MEAN

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
+from benchmarks.real.choose_motor import choose_motor
 from benchmarks.table import Table
 from omnidyn.identification.motors.choice import run_motor
-from omnidyn.identification.motors.choose_motor import choose_motor
 from omnidyn.identification.motors.estimate import MotorEstimate
 from omnidyn.identification.motors.fit import fit_motor
 from omnidyn.identification.motors.input_between_rows import HOLD, MEAN

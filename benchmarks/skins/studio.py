@@ -26,6 +26,7 @@ import psutil
 import socketio
 
 from benchmarks.table import Table, machine
+from omnidyn.studio.server import RECONNECT
 from tests.studio.conftest import Studio, launched, running
 from tests.support.raw_sockets import frames_of, open_web_socket, text_frame
 
@@ -33,7 +34,7 @@ SECONDS = float(os.environ.get("OMNIDYN_BENCH_SECONDS", "600"))
 RATE, LEAST_RATE = 60.0, 59.0  # frames a second
 MOST_MB, SILENT, PAGES = 5.0, 30.0, 50
 AGE = 0.5  # [s] of the newest frame that a slow client gets when it reads again
-RECONNECT = 6.0  # [s] after which a page that is gone is forgotten
+FORGOTTEN = RECONNECT + 3.0  # [s] after which a page that is gone is forgotten
 COLUMNS = ["what", "result", "unit"]
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -128,7 +129,7 @@ async def _many_pages(table: Table, studio: Studio) -> None:
         for _ in range(2):
             for _ in range(PAGES):
                 await _one_page(client, studio.port)
-            await asyncio.sleep(RECONNECT)
+            await asyncio.sleep(FORGOTTEN)
             memory.append(_memory(studio))
     change = memory[1] - memory[0]
     what = f"{PAGES} pages after {PAGES}: memory of the server, change"

@@ -60,15 +60,20 @@ async def _study(folder: Path) -> dict[str, Counter[str]]:
     counts = {}
     for job in _jobs(studio):
         await job.run()  # loads and compiles
-        begun = time.monotonic()
-        await job.run()
-        seconds = time.monotonic() - begun
+        seconds = min([await _seconds(job), await _seconds(job)])
         counts[job.worker] = Counter[str]()
         for _ in range(KILLS):
             counts[job.worker].update(await _kill(job, studio.session.workers[job.worker], draws.uniform(0.0, seconds)))
         print(job.worker, dict(counts[job.worker]), flush=True)
     await studio.session.close()
     return counts
+
+
+async def _seconds(job: Job) -> float:
+    """What a job takes [s]."""
+    begun = time.monotonic()
+    await job.run()
+    return time.monotonic() - begun
 
 
 async def _kill(job: Job, worker: Worker, wait: float) -> list[str]:
@@ -89,6 +94,7 @@ def _jobs(studio: Studio) -> list[Job]:
     """A job of each worker."""
     session, (log,) = studio.session, studio.session.logs.values()
     fitting, tracks, comparing, driving = studio.fitting, studio.tracks, studio.comparing, studio.driving
+    watching = studio.watching
 
     async def drive() -> None:
         """A drive of half a second."""
@@ -98,6 +104,14 @@ def _jobs(studio: Studio) -> list[Job]:
         driving.send({"stop": True})
         await task
 
+    async def watch() -> None:
+        """Watch the log for half a second."""
+        task = asyncio.ensure_future(watching.run(log))
+        await _until(lambda: task.done() or (watching.running and watching.status is not None))
+        await asyncio.sleep(0.5)
+        watching.stop()
+        await task
+
     of_tasks = (("fit", fitting), ("track", tracks), ("compare", comparing))
     return [
         Job("log", lambda: session.check(log), lambda: log.ended, lambda: log.result is not None),
@@ -105,6 +119,7 @@ def _jobs(studio: Studio) -> list[Job]:
             Job(name, tab.run, lambda tab=tab: tab.last.stopped, lambda tab=tab: tab.last.result is not None)
             for name, tab in of_tasks
         ),
+        Job("watch", watch, lambda: bool(watching.trouble), lambda: bool(watching.status) and not watching.trouble),
         Job("drive", drive, lambda: bool(driving.trouble), lambda: not driving.trouble),
     ]
 

@@ -7,9 +7,9 @@
 Names are imported on first use, so that `import omnidyn` costs nothing.
 
 Each room imports only from those before it. What all stand on: errors, progress, arguments, arrays, files, units,
-statistics, clocks; document, shown, statement and attempts (what results are made of, and what follows a fit); compiled
-(machine code). Then sensors, run, model, simulation, logs, findings (`check`), comparison, identification, control,
-driving, campaigns; telling (their words), paper, report, export, interop. Skins: cli, studio.
+statistics, clocks; glossary, document, shown, statement and attempts (what results are made of, and what follows a
+fit); compiled (machine code). Then sensors, run, model, simulation, logs, findings (`check`), comparison,
+identification, control, driving, campaigns; telling (their words), paper, report, export, interop. Skins: cli, studio.
 """
 
 from __future__ import annotations

@@ -13,10 +13,13 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
+from omnidyn.glossary import explained
+
 WIDTH = 100  # columns of text that knows no terminal
 GAP = "  "  # between two columns of a table
 TINY_CHANCE = 0.001
 VERDICT_WORDS = 25  # of a line
+NAME_WORDS = 2  # at most, of what a verdict is about
 MOST_DIGITS = 6  # of two numbers that are nearly alike
 MOST_WHOLE = 1e6  # from which on an exponent reads better
 
@@ -151,12 +154,15 @@ def in_clauses(words: str, most: int = VERDICT_WORDS) -> tuple[str, list[str]]:
     """(the first clauses with at most so many words, a sentence; the other clauses): how a long verdict is laid out.
 
     A clause ends at a semicolon or with its sentence, outside of brackets; a first one that is too long at a colon or
-    before "but" too.
+    before "but" too, or at a comma where a name alone stands before the colon.
     """
     first, *others = _cut(words, r"(?<=;) |(?<=\.) (?=[A-Z])")
     if len(first.split()) > most:
         parts = _cut(first, r"(?<=:) |(?<=,) (?=but )")
         count = _fitting(parts, most)
+        if len(" ".join(parts[:count]).split()) <= NAME_WORDS:
+            parts = _cut(first, r"(?<=,) ")
+            count = _fitting(parts, most)
         first, others = " ".join(parts[:count]), [*([" ".join(parts[count:])] if parts[count:] else []), *others]
     else:
         count = _fitting([first, *others], most)
@@ -243,30 +249,3 @@ TELLS_NOTHING = 3.0  # half an interval, of the number, from which on no digit i
 def percent_cell(half: float) -> str:
     """Half an interval as a share of its number, in a table of percents."""
     return f"{100.0 * half:.2g}" if half < TELLS_NOTHING else "-"
-
-
-# Words of the trade, each explained in a line; a result shows the lines of those that occur in it (document.py)
-
-GLOSSARY = {
-    "fit %": "100 (1 - rms error / spread of what was measured): 100 is perfect, 0 no better than its mean.",
-    "VAF %": "variance accounted for: 100 (1 - var error / var measured); it forgives a constant offset.",
-    "white p": "the chance that errors without a memory look so unlike noise; below 0.05 they have a memory.",
-    "chi2": "mean square of the error over that of the noise: 1 where the model leaves nothing but noise.",
-    "std error": "how far the value would scatter if the same were recorded again.",
-    "sandwich": "intervals that hold for errors with a memory too: from their own products, not from white noise.",
-    "autoregression": "errors of which each is a share of the last ones and something new: how they remember.",
-    "nuisance": "a number of the log, not of the robot: a latency, a dead band of the driver.",
-    "jackknife": "standard errors from fits that leave out one direction, or run, at a time.",
-    "bootstrap": "standard errors from fits to stretches drawn again at random.",
-    "left-out error": "rms error of the force in a direction that was not fitted.",
-    "no noise": "follows speeds, voltages, the time or the like by more than chance; a memory alone is not counted.",
-    "held-out error": "squared error on blocks of the log that were not fitted to.",
-    "free run": "the model gets the inputs only, never what was measured after the start.",
-}
-
-_TERMS = {term: re.compile(rf"(?<![\w-]){re.escape(term)}(?:s|(?![\w-]))") for term in GLOSSARY}
-
-
-def explained(text: str) -> list[str]:
-    """The lines of the words that occur in a text, in the order of the glossary."""
-    return [f"{term}: {GLOSSARY[term]}" for term, form in _TERMS.items() if form.search(text)]

@@ -315,3 +315,18 @@ def test_a_log_of_one_row_is_exit_4_without_a_warning_of_numpy(call, tmp_path):
     code, _, err = call(str(tmp_path / "one.csv"), "--robot", "axebot")
     assert code == 4
     assert "no steady window was found" in err
+
+
+def test_a_method_that_the_logs_chose_is_named_in_the_result_of_the_command(tmp_path, capsys):
+    """The logs have currents and no voltage: whole logs cannot be fitted."""
+    for k, run in enumerate(clean_runs(robot_with("disc"), DIRECTIONS)):
+        write_run(run.replace(voltage=None), tmp_path / f"run{k}.csv")
+    assert main(["identify", str(tmp_path), "--robot", "axebot", "--quick", "--json"]) == 0
+    assert "method_chosen" in [warning["code"] for warning in json.loads(capsys.readouterr().out)["warnings"]]
+
+
+@pytest.mark.parametrize("command", ["check", "identify"])
+def test_a_file_that_is_named_twice_is_said_once(command, floors, capsys):
+    log = str(floors / "smooth" / "run0.csv")
+    main([command, log, log, "--robot", "axebot"])
+    assert capsys.readouterr().err.count("1 of 2 files are named twice") == 1

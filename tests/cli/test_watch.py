@@ -37,7 +37,7 @@ def test_a_file_that_grows_and_is_written_anew(call, here, lines, monkeypatch):
         next(steps, lambda: None)()
         sleep(seconds)
 
-    monkeypatch.setattr("omnidyn.cli.watch.time.sleep", pause)
+    monkeypatch.setattr("omnidyn.logs.growing.time.sleep", pause)
     code, out, err = call("watch", "log.csv", "--robot", "axebot", "--idle", "0.5", "--within", "60")
     assert code in (0, 4)
     assert "log.csv was written anew" in err
@@ -116,7 +116,7 @@ def test_numbers_are_shown_though_a_file_of_another_robot_takes_the_place(call, 
     (here / "log.csv").write_text("".join(lines[:700]))
     other = "t_s,u1_V,u2_V,u3_V,u4_V,vx_m_s,vy_m_s,omega_rad_s\n"
     other += "".join(f"{0.01 * k:.2f},1,1.1,{k % 9},1.3,0.1,0.2,0.3\n" for k in range(300))
-    monkeypatch.setattr("omnidyn.cli.watch.time.sleep", lambda _: (here / "log.csv").write_text(other))
+    monkeypatch.setattr("omnidyn.logs.growing.time.sleep", lambda _: (here / "log.csv").write_text(other))
     code, out, err = call("watch", "log.csv", "--robot", "axebot", "--idle", "5")
     assert code == 3
     assert "more wheels than the robot; got 4 wheels; expected 3" in err

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.findings.check import check
-from omnidyn.findings.finding import judged_again, rest_on_guesses
+from omnidyn.findings.guessed import judged_again, rest_on_guesses
 from omnidyn.identification.log_verdicts import judged_by_fit
 from omnidyn.logs.columns.mapping import load_map
 from omnidyn.logs.read_log import LogOptions, recorded_log

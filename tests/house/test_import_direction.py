@@ -25,6 +25,7 @@ FLOORS = (
     "units",
     "statistics",
     "clocks",
+    "glossary",
     "document",
     "shown",
     "statement",

@@ -43,8 +43,8 @@ def test_the_page_for_users_has_every_result_and_no_other():
 
 def test_every_benchmark_is_a_module_that_measures():
     assert [name for name in NAMES if find_spec(module_of(name)) is None] == []
-    assert {module_of(name) for name in ("house", "blind", "control")} == {
+    assert {module_of(name) for name in ("house", "blind", "tune")} == {
         "benchmarks.house",
         "benchmarks.blind",
-        "benchmarks.control.control",
+        "benchmarks.control.tune",
     }

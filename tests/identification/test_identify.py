@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import omnidyn
 from omnidyn import Run, load_robot, simulate
 from omnidyn.attempts import Attempts
 from omnidyn.errors import InputError
@@ -12,7 +13,7 @@ from omnidyn.identification import advice
 from omnidyn.identification import identify as module
 from omnidyn.identification.default_method import as_driven
 from omnidyn.identification.identify import identify
-from omnidyn.identification.methods import SteadyState
+from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.logs.log import Log
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
 from tests.support.steady_logs import clean_runs, robot_with
@@ -73,6 +74,17 @@ def test_a_method_that_the_logs_chose_is_named_in_the_result():
     assert result.method == SteadyState()
     (note,) = [warning for warning in result.warnings if warning.code == "method_chosen"]
     assert "holds set speeds only" in note.numbers["why"]
+
+
+def test_a_result_says_what_it_was_made_from(duties):
+    robot, method = load_robot("axebot"), OutputError(nuisances=())
+    made = identify(duties, robot, method, quick=True).provenance
+    assert made["omnidyn"] == omnidyn.__version__
+    assert made["command"] == f"omnidyn.identify(logs, robot, {method!r}, quick=True)"
+    assert [(source["role"], source["name"]) for source in made["inputs"]] == [("robot", "axebot"), ("log", "duty.csv")]
+    again = identify(duties.replace(duty=duties.duty * 1.01, source="new.csv"), robot, quick=True).provenance
+    assert again["inputs"][0] == made["inputs"][0]
+    assert again["inputs"][1]["sha256"] != made["inputs"][1]["sha256"]
 
 
 def test_a_drive_that_the_file_states_stays(duties):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.real import real_fit, udea
+from benchmarks.real.choose_motor import choose_motor
 from omnidyn import MotorFit, identify
 from omnidyn.identification.motors.choice import fit_rmse
-from omnidyn.identification.motors.choose_motor import choose_motor
 from omnidyn.identification.motors.fit import fit_motor
 from tests.support import real_logs as logs
 

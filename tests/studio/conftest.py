@@ -9,6 +9,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,6 +18,8 @@ import pytest
 
 if folder := os.environ.get("OMNIDYN_PLAYWRIGHT"):
     sys.path.append(folder)
+
+PATIENCE = 200  # [s] that a server has to begin, and to end
 
 
 @dataclass(frozen=True)
@@ -33,13 +36,22 @@ def running(*arguments: str) -> Iterator[Studio]:
     """A studio on a free port."""
     words = [sys.executable, "-m", "omnidyn", "studio", "--no-browser", "--port", "0", *arguments]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        late = threading.Timer(PATIENCE, process.kill)  # it never says its address
+        late.start()
         try:
             assert process.stdout is not None
-            address = process.stdout.readline().split()[-1]
+            said = process.stdout.readline()
+            late.cancel()
+            assert said, "the server ended before it said its address"
+            address = said.split()[-1]
             yield Studio(process, address, int(address.split("://")[1].split("/")[0].rpartition(":")[2]))
         finally:
+            late.cancel()
             process.terminate()
-            process.wait(200)
+            try:
+                process.wait(PATIENCE)
+            finally:
+                process.kill()  # else the end of `with` waits for it for ever
 
 
 @pytest.fixture(scope="module")

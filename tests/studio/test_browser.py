@@ -180,7 +180,7 @@ def test_what_is_missing_is_added_by_a_button(browser, tmp_path):
     page.click("#fit:not([disabled])")
     verdict(page, "#fit-verdict")
     assert "motor.resistance_ohm" not in numbers(page)
-    page.click("text=Add motor.resistance_ohm and refit")
+    page.click("text=Add resistance and refit")
     page.get_by_role("cell", name="motor.resistance_ohm").first.wait_for()
     shown = float(numbers(page)["motor.resistance_ohm"])
     assert shown == pytest.approx(1.25 * resistance.get(robot), rel=0.02)
@@ -230,7 +230,7 @@ def test_the_dead_zone_is_felt_and_the_drive_is_fitted(browser, tmp_path):
     page.wait_for_selector("omni-drive canvas")
     page.wait_for_function("document.querySelector('omni-drive').painted > 10")
     axes = command("deadzone", "axebot", "--json")[0]["dead_zone"]
-    assert f"forward {axes[0]['breakaway_scale_V']:.4g} V" in page.inner_text("#breakaway")
+    assert f"forward {axes[0]['breakaway_scale_V']:.3g} V" in page.inner_text("#breakaway")
     still = "document.querySelector('omni-drive').dataset.still"
     slide(page, "level", 0.6)
     page.keyboard.down("w")
@@ -246,7 +246,7 @@ def test_the_dead_zone_is_felt_and_the_drive_is_fitted(browser, tmp_path):
     omnidyn.save_robot(rough, tmp_path / "rough.toml")
     axes = command("deadzone", tmp_path / "rough.toml", "--json")[0]["dead_zone"]
     page.wait_for_function(
-        f"document.querySelector('#breakaway').innerText.includes('forward {axes[0]['breakaway_scale_V']:.4g} V')"
+        f"document.querySelector('#breakaway').innerText.includes('forward {axes[0]['breakaway_scale_V']:.3g} V')"
     )
     pad = page.get_by_role("button", name="W forward").bounding_box()
     page.mouse.move(pad["x"] + 5, pad["y"] + 5)

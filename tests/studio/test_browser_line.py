@@ -5,6 +5,7 @@ import signal
 import subprocess
 
 import omnidyn
+from omnidyn.document import sentence
 from omnidyn.model.keys import Key, find_key
 from tests.support.pages import choose_axebot, command, drop, laid_out, load_again, numbers, shown, tab, verdict
 from tests.support.pages import write_log as written
@@ -70,7 +71,7 @@ def test_a_process_that_ends_is_said_and_run_again(browser, tmp_path):
     verdict(page)
     choose_axebot(page)
     page.click("#fit:not([disabled])")
-    page.wait_for_function("(document.querySelector('#fit-progress')?.innerText || '').includes('fitting')")
+    page.wait_for_function("document.querySelector('#fit-progress')?.innerText.startsWith('part ')")  # it has begun
     for pid in workers(studio):
         os.kill(pid, signal.SIGKILL)
     page.wait_for_selector("#fit-stopped-again")
@@ -155,6 +156,33 @@ def test_robots_are_seen_edited_renamed_and_removed_and_a_map_is_none(browser, t
     assert states(page)["Robot"] == ("○", "none chosen")
 
 
+def test_a_log_that_grows_is_watched(browser, tmp_path):
+    rows = written(tmp_path / "whole.csv", 20.0).read_text("utf-8").splitlines(keepends=True)
+    path = tmp_path / "log.csv"
+    path.write_text("".join(rows[:900]), "utf-8")
+    _, page = browser.start(path)
+    verdict(page)
+    assert page.is_disabled("#watch")
+    choose_axebot(page)
+    tab(page, "Log")
+    page.click("#watch:not([disabled])")
+    page.wait_for_selector(".meter")
+    with path.open("a", encoding="utf-8") as file:
+        file.write("".join(rows[900:]))
+    live = omnidyn.Live(omnidyn.load_robot("axebot")).add(omnidyn.read_log(path))
+    said = laid_out(f"log.csv: {sentence(str(live.verdict))}")
+    same = "words => document.querySelector('#live-verdict')?.innerText.includes(words)"
+    page.wait_for_function(same, arg=said.splitlines()[0])
+    assert verdict(page, "#live-verdict") == said
+    known = [number.is_reached for number in live.numbers.values() if number.within]
+    assert page.locator(".meter").count() == len(known)
+    assert page.locator(".meter .reached").count() == sum(known)
+    shown(page, "live")
+    page.click("#stop-watching")
+    page.get_by_text("The same by hand (watch)").click()
+    assert page.inner_text("#call-watch") == f"omnidyn watch {path} --robot axebot --within 10"
+
+
 def press_on(page, selector):
     """Go to an element by Tab alone, as somebody without a mouse, and press Enter on it."""
     page.wait_for_selector(f"{selector}:not([disabled])")
@@ -185,12 +213,15 @@ def test_by_keyboard_from_two_logs_of_which_one_has_a_wrong_sign_to_a_robot_file
     press_on(page, "#next-robot")
     page.wait_for_selector(".free .q-chip")
     page.get_by_text("wrong.csv: vy goes the other way than the voltages drive the robot").wait_for()
+    same = "document.querySelector(\"[aria-label='use of right.csv']\").same"
+    page.evaluate(f"{same} = true")
     press_on(page, "[aria-label='mend wrong.csv']")
     page.wait_for_function(said, arg="2 logs")
+    assert page.evaluate(same)  # a check that ends makes no choice anew: a click on it would be lost
     press_on(page, "#fit")
     words = verdict(page, "#fit-verdict")
     with page.expect_download() as download:
-        press_on(page, "a[href='/fit/robot.toml']")
+        press_on(page, "a.robot-file")
     saved = omnidyn.load_robot(download.value.path().rename(tmp_path / "robot.toml"))
     assert "Failed" not in words
     said = command("identify", right, other, "--robot", "axebot", "--json")[0]

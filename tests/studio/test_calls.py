@@ -162,25 +162,40 @@ FREE = ("friction.axes.coulomb[0]", "friction.axes.viscous[2]")  # the other num
 NOTE = "'" * 3 + chr(10) + " import os"  # of a user: no code
 
 
-@pytest.mark.parametrize("free", [(), FREE])
-def test_logs_of_different_maps_give_by_hand_what_the_page_gives(three_maps, free):
+GROUPS = {"another_sign.csv": "dry floor", "another_column.csv": "wet", "another_unit.csv": "dry floor"}
+
+
+@pytest.mark.parametrize(
+    "free, held_out, groups",
+    [((), "another_column.csv", {}), (FREE, "another_column.csv", {}), (FREE, "another_unit.csv", GROUPS)],
+)
+def test_logs_of_different_maps_give_by_hand_what_the_page_gives(three_maps, free, held_out, groups):
     session, fitting = three_maps, Fitting(three_maps)
-    fitting.hold_out([log.key for log in session.logs.values() if log.name == "another_column.csv"])
+    fitting.hold_out([log.key for log in session.logs.values() if log.name == held_out])
+    for log in session.logs.values():
+        fitting.name_group(log.key, groups.get(log.name, ""))
     fitting._choices_of = session.robot_path
     asyncio.run(fitting._choose(session.robot_path))
     fitting.set_free(list(free) or fitting.free)
     asyncio.run(fitting.run())
     assert fitting.last.result, fitting.last.error
     (fit,) = by_hand(fitting.last.command, fitting.last.python)
-    on_page = fitting.last.result["values"]
-    assert {name: float(value) for name, value in fit.estimate.value.items()} == on_page
-    of_command, of_page = omnidyn.load_robot("fitted.toml"), omnidyn.load_robot(fitting.last.folder / "robot.toml")
-    for name in filter(find_key, on_page):
-        assert Key.parse(name).get(of_command) == Key.parse(name).get(of_page)
+    folder, result = fitting.last.folder, fitting.last.result
+    assert [*result["values"]] == ([*dict.fromkeys(groups.values())] if groups else [""])
+    for group, on_page in result["values"].items():
+        estimate = fit.groups[group] if group else fit.estimate
+        assert {name: float(value) for name, value in estimate.value.items()} == on_page
+        assert set(on_page) >= set(free)
+        of_command = omnidyn.load_robot(f"fitted-{group.replace(' ', '-')}.toml" if group else "fitted.toml")
+        of_page = omnidyn.load_robot(folder / result["robots"][group])
+        for name in filter(find_key, on_page):
+            assert Key.parse(name).get(of_command) == Key.parse(name).get(of_page)
     assert fit.headline == fitting.last.result["verdict"]
     assert not fitting.last.result["failed"]
-    assert set(on_page) >= set(free)
-    fitting.note("fit-1.toml", NOTE)
+    kept = fitting.history
+    assert [*kept] == ([f"fit-1-{group}.toml" for group in ("dry_floor", "wet")] if groups else ["fit-1.toml"])
+    assert len(result["differences"]["rows"]) == (len(free) if groups else 0)
+    fitting.note(next(iter(kept)), NOTE)
     work = script(fitting, {"compare": Task(), "track": Task()})
     assert "eval" not in work
     assert str(session.folder) not in work
@@ -189,8 +204,25 @@ def test_logs_of_different_maps_give_by_hand_what_the_page_gives(three_maps, fre
     with redirect_stdout(StringIO()) as out:
         exec(compile(work, "work.py", "exec"), {})
     assert fitting.last.result["verdict"] in out.getvalue()
-    of_script, of_page = Path("fit-1.toml"), fitting.last.folder / "robot.toml"
-    assert of_script.read_text("utf-8") == of_page.read_text("utf-8")
+    assert work.count("omnidyn.identify(") == 1
+    for name, one in kept.items():
+        assert Path(name).read_text("utf-8") == (folder / one.file).read_text("utf-8")
+
+
+def test_groups_that_a_fit_cannot_have_are_said_before(three_maps):
+    fitting, (first, second, third) = Fitting(three_maps), three_maps.logs
+    for key, group, code in ((first, "=a,b;", "no_group"), (second, "ab", "no_group"), (third, "ab", "one_group")):
+        fitting.name_group(key, group)
+        assert fitting.why_not()[0] == code
+    assert fitting.group_of(first) == "ab"  # a name that commands and files can have
+    fitting.name_group(third, "c")
+    assert fitting.why_not()[0] == ""
+    fitting.hold_out([third])
+    assert fitting.why_not()[0] == "one_group"
+    fitting.name_group(second, "d")
+    assert fitting.why_not()[0] == "group_held_out"
+    fitting.use(third, "leave out")
+    assert fitting.why_not()[0] == ""
 
 
 def by_hand_as_json(words, python):

@@ -13,7 +13,9 @@ import omnidyn
 from omnidyn.studio import calls
 from omnidyn.studio.calls import MAX_NAME
 from omnidyn.studio.compare.state import Comparing
+from omnidyn.studio.fit.job import PARTS, _fitted
 from omnidyn.studio.fit.state import Fitting
+from omnidyn.studio.job import part_of
 from omnidyn.studio.script import script
 from omnidyn.studio.session import MAX_FILES, RefusedError, Session
 from omnidyn.studio.task import Task
@@ -48,7 +50,7 @@ def kept(session, fitting, count=1):
 def test_fits_are_kept_named_noted_and_shown_again(session):
     fitting = Fitting(session)
     kept(session, fitting, 2)
-    first, second = fitting.history.values()
+    first, second = (kept.fit for kept in fitting.history.values())
     assert [omnidyn.load_robot(session.robots[name]).name for name in fitting.history] == [
         "axebot, fit-1",
         "axebot, fit-2",
@@ -60,16 +62,17 @@ def test_fits_are_kept_named_noted_and_shown_again(session):
     assert fitting.rename("fit-1.toml", "carpet") == ""
     assert list(fitting.history) == ["fit-2.toml", "carpet.toml"]
     assert (session.robot, Path(session.robot_path).name) == ("carpet.toml", "carpet.toml")
-    assert fitting.notes["carpet.toml"] == "the old floor"
+    assert fitting.history["carpet.toml"].note == "the old floor"
+    assert omnidyn.load_robot(session.robot_path).name == "axebot, carpet"  # also in the file that is downloaded
     assert "there is a robot of this name" in fitting.rename("carpet.toml", "fit-2")
     assert asyncio.run(session.keep_robot("", "carpet", "carpet.toml")) != ""  # a fit is not written over
     fitting.remove("carpet.toml")
     assert list(fitting.history) == ["fit-2.toml"]
     assert session.robot == ""
     session.undo()
-    assert fitting.history["carpet.toml"] is first
+    assert fitting.history["carpet.toml"].fit is first
     assert session.robot == "carpet.toml"
-    assert fitting.history["fit-2.toml"] is second
+    assert fitting.history["fit-2.toml"].fit is second
 
 
 def test_a_log_that_was_removed_comes_back_and_its_file_goes_with_the_next_removal(session, tmp_path):
@@ -156,7 +159,7 @@ def test_the_words_of_the_library_have_the_names_of_the_page():
     said = "hold out a log with `hold_out`, see `check`; raise `max_bytes`"
     assert in_page_names(said) == "hold out a log with hold out (tab Fit), see check; raise --max-bytes"
     assert in_page_names("hold it out (`hold_out`): then") == "hold it out (hold out, tab Fit): then"
-    told = each_text({"text": said, "columns": [{"column": "`hold_out`"}]}, in_page_names)
+    told = each_text({"text": said, "columns": [{"column": "`hold_out`"}]}, in_page_names, str)
     assert told["columns"] == [{"column": "`hold_out`"}]
     assert "`" not in told["text"]
     for name in ("latency.csv", "latency.twist.csv", "twist[1].csv"):  # a file of a user stays as it is
@@ -166,11 +169,41 @@ def test_the_words_of_the_library_have_the_names_of_the_page():
     )
 
 
+@pytest.mark.parametrize(
+    "said, shown",
+    [
+        (
+            "which may be voltages or speeds (say `column` u1=V1:V and so on): not taken",
+            "which may be voltages or speeds (say that V1 is u1 in V and so on: Columns and units, tab Log): not taken",
+        ),
+        (
+            'the motion says `column` "w1=m 1:rpm@motor" w2=-m2:rad/s',
+            "the motion says that m 1 is w1 in rpm at the motor and m2 is w2 in rad/s, other sign: "
+            "Columns and units (tab Log)",
+        ),
+        ("no unit is given (say `assume` d=V, duty or %)", "no unit is given (say the unit: V, duty or %)"),
+        (
+            "motor.resistance_ohm is a guess: fit it (`free` friction `free` motor.resistance_ohm).",
+            "resistance is a guess: fit it (choose resistance under Free, tab Fit).",
+        ),
+        ("fit it (`nuisances` latency)", "fit it (--nuisances latency)"),
+        ("resistance (motor.resistance_ohm) is off", "resistance is off"),
+        (
+            "friction.axes.coulomb.toml and a/motor.resistance_ohm",
+            "friction.axes.coulomb.toml and a/motor.resistance_ohm",
+        ),
+    ],
+)
+def test_no_key_and_no_argument_of_the_command_line_stands_in_prose(said, shown):
+    told = each_text({"verdict": said, "rows": [[said]]}, in_page_names, str)
+    assert told == {"verdict": shown, "rows": [[said]]}
+
+
 @pytest.mark.parametrize("name", ['ends in "', "x'", "a\\b", "ü", "n" * 400])
 def test_a_fit_is_told_apart_whatever_its_robot_is_called(session, name):
     fitting, folder = Fitting(session), session.new_folder()
     omnidyn.save_robot(omnidyn.load_robot("axebot").replace(name=name), folder / "robot.toml")
-    key = fitting.keep(Task(result={"verdict": "Good.", "failed": False}, folder=folder))
+    (key,) = fitting.keep(Task(result={"verdict": "Good.", "failed": False}, folder=folder))
     assert omnidyn.load_robot(session.robots[key]).name == f"{name[:MAX_NAME]}, fit-1"
 
 
@@ -238,3 +271,21 @@ def test_the_script_runs_after_a_fit_was_renamed_and_with_a_drawn_path(session, 
         assert name in out.getvalue()
         assert f"{rmse:.4g}" in out.getvalue()
     assert "pid" in out.getvalue()
+
+
+def test_a_fit_says_which_part_of_how_many_it_is_at_and_what_the_last_one_took(session, tmp_path):
+    phases, path = [], str(write_log(tmp_path / "log.csv", 4.0))
+    log = {"path": path, "name": "log.csv", "map": "", "unsigned": False}
+    request = {"robot": "axebot", "logs": [log], "hold_out": [], "folder": str(tmp_path / "fit"), "command": ""}
+    _fitted(request, lambda report: phases.append(report.phase))
+    parts = [part for phase in phases if (part := part_of(phase, PARTS))]
+    assert parts == sorted(parts)
+    assert {*parts} == {*range(1, len(PARTS) + 1)}  # each phase of the library has its part
+    session.add_log(path, "log.csv")
+    asyncio.run(session.check(next(iter(session.logs.values()))))
+    fitting = Fitting(session)
+    asyncio.run(fitting.run())
+    assert fitting.last.before is None  # nothing is known yet, and nothing is said
+    fitting.last.spent = 14.0
+    asyncio.run(fitting.run())
+    assert fitting.last.before == 14.0

@@ -1,7 +1,6 @@
 """A process that ends is said, and the next job runs: asked of the server's side, without pages."""
 
 import asyncio
-import contextlib
 import os
 import signal
 
@@ -14,18 +13,30 @@ from omnidyn.studio.session import Session
 from omnidyn.studio.worker import CancelledError, EndedError, Worker
 from tests.support.pages import write_log
 
+PATIENCE = 120  # [s]
 
-def kill(worker):
-    """End the process of a worker, as a system without memory does."""
-    with contextlib.suppress(ProcessLookupError):
-        os.kill(worker._process.pid, signal.SIGKILL)
+
+def kill(worker, by=signal.SIGKILL):
+    """End the process of a worker, as a system without memory does, or stop it."""
+    if worker._process.returncode is None:  # else its number may be that of another process by now
+        os.kill(worker._process.pid, by)
+
+
+def works(worker):
+    """Whether a process is there that does a job: one that ended is not."""
+    return worker.busy and worker._process is not None and worker._process.returncode is None
 
 
 async def finished(condition):
     """Wait until something is so."""
-    async with asyncio.timeout(120):
+    async with asyncio.timeout(PATIENCE):
         while not condition():
             await asyncio.sleep(0.005)
+
+
+def run(scenario):
+    """Do a scenario, which ends."""
+    return asyncio.run(asyncio.wait_for(scenario(), 4 * PATIENCE))
 
 
 def test_a_process_that_ends_is_an_error_and_the_next_job_gets_another(tmp_path):
@@ -40,7 +51,7 @@ def test_a_process_that_ends_is_an_error_and_the_next_job_gets_another(tmp_path)
         assert (await worker.run("free_keys", {"robot": "axebot"}, lambda kind, value: None))["default"]
         await worker.stop()
 
-    asyncio.run(scenario())
+    run(scenario)
 
 
 def test_a_short_job_is_done_once_more_where_its_process_ends(monkeypatch):
@@ -65,7 +76,7 @@ def test_what_is_cut_short_by_the_end_of_a_process_is_no_message():
         with pytest.raises(EndedError, match="got exit code 3"):
             await worker._result(process, "check", {}, lambda kind, value: None)
 
-    asyncio.run(scenario())
+    run(scenario)
 
 
 def test_a_check_and_a_fit_that_were_ended_are_said_and_run_again(tmp_path, monkeypatch):
@@ -75,7 +86,7 @@ def test_a_check_and_a_fit_that_were_ended_are_said_and_run_again(tmp_path, monk
         session = Session()
         fitting, log = Fitting(session), session.add_log(str(write_log(tmp_path / "log.csv", 150.0)), "log.csv")
         session.robot = "axebot"
-        await finished(lambda: session.workers["log"]._process is not None)
+        await finished(lambda: works(session.workers["log"]))
         kill(session.workers["log"])
         await finished(lambda: log.ended)
         assert "run it again" in log.error
@@ -84,14 +95,14 @@ def test_a_check_and_a_fit_that_were_ended_are_said_and_run_again(tmp_path, monk
         await session.check(log)
         assert fitting.why_not() == ("", "")
         fit = asyncio.create_task(fitting.run())
-        await finished(lambda: session.workers["fit"].busy and session.workers["fit"]._process is not None)
+        await finished(lambda: works(session.workers["fit"]))
         kill(session.workers["fit"])
         await fit
         assert fitting.last.stopped
         assert "run it again" in fitting.last.error
         fit = asyncio.create_task(fitting.run())
-        await finished(lambda: session.workers["fit"].busy and session.workers["fit"]._process is not None)
-        os.kill(session.workers["fit"]._process.pid, signal.SIGSTOP)  # else it may be done before it hears that
+        await finished(lambda: works(session.workers["fit"]))
+        kill(session.workers["fit"], signal.SIGSTOP)  # else it may be done before it hears that
         await fitting.last.cancel(session, "fit", "fit")
         await fit
         assert fitting.last.stopped
@@ -100,7 +111,7 @@ def test_a_check_and_a_fit_that_were_ended_are_said_and_run_again(tmp_path, monk
         assert not fitting.last.stopped
         await session.close()
 
-    asyncio.run(scenario())
+    run(scenario)
 
 
 def test_a_job_that_is_killed_after_it_was_cancelled_was_cancelled(monkeypatch):
@@ -109,10 +120,10 @@ def test_a_job_that_is_killed_after_it_was_cancelled_was_cancelled(monkeypatch):
     async def scenario():
         worker = Worker()
         job = asyncio.create_task(worker.run("drive", {"robot": "axebot", "folder": "/nonexistent"}, lambda *_: None))
-        await finished(lambda: worker.busy and worker._process is not None)
-        os.kill(worker._process.pid, signal.SIGSTOP)  # it hears nothing
+        await finished(lambda: works(worker))
+        kill(worker, signal.SIGSTOP)  # it hears nothing
         await worker.cancel()
         with pytest.raises(CancelledError):
             await job
 
-    asyncio.run(scenario())
+    run(scenario)

@@ -74,7 +74,8 @@ def test_all_comes_back(make, tmp_path):
     studio.fitting.hold_out(["log2"])
     session.add_robot(str(files["mine.toml"]), "mine.toml")
     fit = Task(result={"verdict": "Good.", "failed": False}, folder=tmp_path, command="rm -r x", python="x")
-    name = studio.fitting.keep(fit)
+    (name,) = studio.fitting.keep(fit)
+    studio.fitting.name_group("log1", "wet floor")
 
     async def again():
         path = await studio.save()
@@ -88,6 +89,7 @@ def test_all_comes_back(make, tmp_path):
     assert [log.name for log in logs] == ["log.csv", "other.csv"]
     assert [log.unsigned for log in logs] == [False, True]
     assert other.fitting.held_out == [logs[1].key]
+    assert other.fitting.groups == {logs[0].key: "wet floor", logs[1].key: ""}
     for log, name_before in zip(logs, ("log.csv", "other.csv"), strict=True):
         assert Path(log.path).read_bytes() == files[name_before].read_bytes()
     assert Path(logs[1].map).read_bytes() == files["columns.toml"].read_bytes()
@@ -190,4 +192,4 @@ def test_a_workspace_from_before_there_were_notes_opens(make, tmp_path):
     studio = make()
     asyncio.run(studio.open(str(path), path.name))
     assert list(studio.fitting.history) == ["fit-1.toml"]
-    assert studio.fitting.notes == {"fit-1.toml": ""}
+    assert studio.fitting.fits["fit-1.toml"].note == ""

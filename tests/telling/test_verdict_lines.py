@@ -136,6 +136,7 @@ def test_a_verdict_is_a_line_and_then_a_list(verdict):
         ("Of 2.5 V; v. 3 is one.", "Of 2.5 V.", ["v. 3 is one"]),
         ("A b: c d: e f g h; i.", "A b: c d.", ["e f g h", "i"]),
         ("A b c (d: e), but f g.", "A b c (d: e).", ["but f g"]),
+        ("Dry: a b c, d e f; g.", "Dry: a b c.", ["d e f", "g"]),
     ],
 )
 def test_clauses_end_outside_of_brackets(words, first, clauses):

@@ -4,9 +4,9 @@ Exit codes: 0 ok, 1 our bug, 2 usage, 3 bad input, 4 the data cannot answer, 5 a
 6 an extra is missing, 130 interrupted, 143 terminated; a closed pipe is 0.
 
 app has all commands. One file for each, or for those that belong together: init (the robot itself in init_robot),
-check, plan, drive, watch, identify (its logs in identify_logs, what it writes in identify_show), compare, simulate,
-loops (`track`, `tune`), sweep, at_rest (`deadzone`), exchange (`import`, `export`), logs (`convert`), demo, warm,
-doctor.
+check, plan, drive, watch, identify (its logs in identify_logs, what it writes in identify_show, for motors in
+identify_motors), compare, simulate, loops (`track`, `tune`), sweep, at_rest (`deadzone`), friction, exchange (`import`,
+`export`), logs (`convert`), info (`info`, `align`), demo, warm, doctor.
 What they share: log_options, outcome (how a command ends), terminal/.
 demo_folder: the folder of the demo.
 identify_brief: the result on one screen.

@@ -43,26 +43,3 @@ def _draw(zone: DeadZone, path: str, force: bool) -> None:
     with shown_progress("drawing the map"):
         name = zone.robot.name
         write_picture(draw_dead_zone_map({name: zone.robot}, {name: zone}), path, force)
-
-
-# omnidyn friction ROBOT: what the friction of a robot does, near zero speed above all
-
-
-def friction(
-    robot: str = typer.Argument(metavar="ROBOT", help="A preset (see: omnidyn robots) or a robot file."),
-    picture: str = typer.Option("", "--picture", metavar="FILE", help="Draw it, as .png or .svg."),
-    force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
-    json: bool = typer.Option(False, "--json", help="For machines."),
-) -> None:
-    """Show its friction: force against speed, presliding, breakaway."""
-    refuse_picture(picture, force)
-    keep_inputs([], [robot], [], picture)
-    from omnidyn.simulation.friction_study import friction_study
-
-    loaded, source = omnidyn.load_robot(robot), robot_input(robot)
-    study = friction_study(loaded)
-    tell(study.document(), json, provenance([source]))
-    if picture:
-        from omnidyn.report.friction_picture import draw_friction
-
-        write_picture(draw_friction({loaded.name: study}), picture, force)

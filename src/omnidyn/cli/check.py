@@ -65,12 +65,11 @@ def check(
     if picture and (len(log) > 1 or os.path.isdir(log[0])):
         raise InputError("a picture shows one log", got=" ".join(log), expected="one file", where="--picture")
     refuse_picture(picture, force)
-    log_options.keep_inputs(log, [robot], [flags.map_file], picture, flags.save_map)
+    files = log_options.keep_inputs(log, [robot], [flags.map_file], picture, flags.save_map)
     if len(log) == 1:
-        log_options.refuse_missing(log)
+        log_options.refuse_missing(files)
     options, maps = flags.options(), flags.maps(force)
     with shown_progress("reading") as progress:
-        files = log_options.log_files(log)
         loaded = omnidyn.load_robot(robot) if robot else None
         checked_logs = [_checked(path, loaded, options, maps, progress, bool(picture)) for path in files]
     _compare_data(checked_logs)

@@ -56,14 +56,14 @@ def compare(
     if len(robot) > MOST_ROBOTS:
         raise typer.BadParameter(f"--robot may be given once or twice, not {len(robot)} times.")
     refuse_picture(picture, force)
-    log_options.keep_inputs(log, robot, [flags.map_file], picture, flags.save_map)
-    log_options.refuse_missing(log)
+    files = log_options.keep_inputs(log, robot, [flags.map_file], picture, flags.save_map)
+    log_options.refuse_missing(files)
     from omnidyn.comparison.threshold import parse_threshold, refuse_exceeded
 
     rules = [parse_threshold(text) for text in fail_if]
     options, maps = flags.options(), flags.maps(force)
     with shown_progress("reading") as progress:
-        files, robots = log_options.log_files(log), _robots(robot, with_)
+        robots = _robots(robot, with_)
         runs, hashes = _runs(files, robots[0], options, flags.sort, maps, progress)
         channels = _channels(robots, runs, apply, rules, show_channels if picture else "")
         comparison = _compared(robots, runs, apply, hold, current_unsigned, band, progress)

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import inspect
-import os
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any, cast
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 import omnidyn
-from omnidyn.attempts import Attempts, not_made
 from omnidyn.cli import log_options as options
-from omnidyn.cli.identify_logs import MOTOR_TABLE, Loaded, LogReading, load_data, table_kind
-from omnidyn.cli.identify_show import Out, say_written
+from omnidyn.cli.identify_logs import MOTOR_TABLE, Loaded, LogFiles, LogReading, load_data, table_kind
+from omnidyn.cli.identify_motors import tell_motors
+from omnidyn.cli.identify_show import Out
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal import identify_options
 from omnidyn.cli.terminal.flags import flags
@@ -23,17 +22,14 @@ from omnidyn.cli.terminal.help import MORE_PANEL
 from omnidyn.cli.terminal.identify_options import MOTORS, IdentifyRequest
 from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
-from omnidyn.cli.terminal.streams import say
-from omnidyn.cli.terminal.telling import end_failed, tell
-from omnidyn.document import apart, sentence
+from omnidyn.cli.terminal.telling import end_failed
 from omnidyn.errors import InputError
 from omnidyn.files import check_output
-from omnidyn.identification.methods import FRICTION_METHODS, MOTOR_METHODS, Method, OutputError, SteadyState
+from omnidyn.identification.methods import FRICTION_METHODS, MOTOR_METHODS, OutputError, SteadyState
 from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
-    from omnidyn.identification.motors.into_robot import MotorNumbers
-    from omnidyn.identification.motors.study import MotorStudy
+    from omnidyn.identification.default_method import Choice
     from omnidyn.identification.planning.got import Promises
     from omnidyn.model.robot import Robot
 
@@ -87,18 +83,18 @@ def identify(
     and says what the data cannot tell.
     """
     request, to = identify_options.identify_request(given), Out(report, out, force, json, full)
-    if not robot and request.what != MOTORS:
-        of_motors = os.path.isfile(logs[0]) and table_kind(logs) == MOTOR_TABLE
-        table = f" {logs[0]} is a table of motors: say --what motors, which needs no robot." if of_motors else ""
-        raise typer.BadParameter(f"Missing option '--robot'.{table}")
     for path in (out, report):  # before any work
         if path:
             check_output(path, force)
-    options.keep_inputs(logs, [robot], [flags.map_file, planned], out, report, flags.save_map)
-    options.refuse_missing(logs)
+    files = options.keep_inputs(logs, [robot], [flags.map_file, planned], out, report, flags.save_map)
+    given_logs = LogFiles.of(logs, files)
+    if not robot and request.what != MOTORS:
+        of_motors = table_kind(given_logs.names) == MOTOR_TABLE
+        table = f" {logs[0]} is a table of motors: say --what motors, which needs no robot." if of_motors else ""
+        raise typer.BadParameter(f"Missing option '--robot'.{table}")
     if planned:
         to = replace(to, planned=_promises(planned))
-    _identify(logs, robot, request, LogReading(flags.options(), flags.sort, flags.maps(force)), to)
+    _identify(given_logs, robot, request, LogReading(flags.options(), flags.sort, flags.maps(force)), to)
 
 
 def _promises(path: str) -> Promises:
@@ -111,7 +107,7 @@ def _promises(path: str) -> Promises:
         raise error.at("--planned") from None
 
 
-def _identify(arguments: list[str], robot: str, request: IdentifyRequest, reading: LogReading, to: Out) -> None:
+def _identify(given: LogFiles, robot: str, request: IdentifyRequest, reading: LogReading, to: Out) -> None:
     """Read, choose the method, identify, tell."""
     from omnidyn.cli.identify_show import load_meanwhile, outputs
     from omnidyn.cli.identify_show import tell as tell_fits
@@ -119,9 +115,10 @@ def _identify(arguments: list[str], robot: str, request: IdentifyRequest, readin
 
     with shown_progress("reading") as progress:
         start = omnidyn.load_robot(robot) if robot else None
-        loaded = load_data(arguments, request, start, reading, progress)
+        loaded = load_data(given, request, start, reading, progress)
         record = provenance([*([robot_input(robot)] if robot else []), *loaded.inputs])
-        method, groups = _method(loaded, request, start, progress), request.groups
+        choice, groups = _choice(loaded, request, start, progress), request.groups
+        method = choice.method
         if loaded.folders and isinstance(method, SteadyState):
             groups = loaded.folders
         elif loaded.folders and isinstance(method, OutputError):
@@ -135,7 +132,7 @@ def _identify(arguments: list[str], robot: str, request: IdentifyRequest, readin
             result = omnidyn.identify(
                 loaded.data,
                 start,
-                method,
+                choice,
                 hold_out=request.hold_out,
                 groups=groups,
                 quick=request.quick,
@@ -148,65 +145,20 @@ def _identify(arguments: list[str], robot: str, request: IdentifyRequest, readin
         if result.interrupted:
             progress(Report("interrupted: the numbers are the best so far, not the best there are", urgent=True))
         if isinstance(result.method, MOTOR_METHODS):
-            _tell(cast("MotorStudy", result.study), start, record, to, progress)
+            tell_motors(result, start, record, to, progress)
             return
         tell_fits(result, attempts, record, to, progress, of_points=not isinstance(loaded.data, list))
     if result.failures:
         end_failed(result.verdict)
 
 
-def _method(loaded: Loaded, request: IdentifyRequest, robot: Robot | None, progress: Progress) -> Method | None:
+def _choice(loaded: Loaded, request: IdentifyRequest, robot: Robot | None, progress: Progress) -> Choice:
     """The method that is asked for, else that of robot and logs; None of a table, which says it."""
-    from omnidyn.identification.default_method import as_driven, default_method, default_motor_method
+    from omnidyn.identification.default_method import Choice, as_driven, default_method, default_motor_method
 
     if request.method or not isinstance(loaded.data, list):
-        return request.method
+        return Choice(request.method)
     if request.what == MOTORS:
-        return default_motor_method(loaded.data, request.input, progress)
+        return Choice(default_motor_method(loaded.data, request.input, progress))
     assert robot is not None
-    return default_method(loaded.data, as_driven(robot, loaded.data), request.hold_out, progress)[0]
-
-
-# The part of `omnidyn identify` for motors: write the robot file and the page, show the result
-
-
-def _tell(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress) -> None:
-    attempts, report, numbers = Attempts(), "", _into_file(study, robot, record, to)
-    document = study.document()
-    if numbers is not None:
-        document = replace(document, parts=apart(document.parts, numbers.parts()))
-    if to.report:
-        progress(Report("drawing"))
-        report = to.write_report(attempts, lambda: _page(study, record))
-    progress(Report("writing"))
-    verdict = " ".join([document.verdict_text, *(sentence(str(statement)) for statement in not_made(attempts.missing))])
-    document = replace(document, verdict=verdict, data={**document.data, "verdict": verdict})
-    robot_dict, omissions = numbers.to_dict() if numbers is not None else None, [*map(asdict, attempts.missing)]
-    tell(document, to.json, record, robot=robot_dict, output=to.files.get(""), report=report or None, missing=omissions)
-    say_written([*to.files.values(), report])
-    to.finish(attempts)
-    if study.failed:
-        end_failed(study.verdict)
-
-
-def _page(study: MotorStudy, record: dict[str, Any]) -> str:
-    from omnidyn.report.motors_page import render_motors
-
-    return render_motors(study, record)
-
-
-def _into_file(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out) -> MotorNumbers | None:
-    """Write the robot file where one is asked for, and the logs determine a number of it."""
-    from omnidyn.identification.motors.into_robot import motors_into_robot
-
-    if not to.out:
-        return None
-    if robot is None:
-        say("omnidyn: a robot file needs the robot that the motors belong to, --robot ROBOT; -o is not used")
-        return None
-    numbers = motors_into_robot(study, robot)
-    if numbers.value:
-        to.save({"": numbers.robot}, record["inputs"])
-    else:
-        say("omnidyn: the logs determine no number of a robot file; -o is not used")
-    return numbers
+    return default_method(loaded.data, as_driven(robot, loaded.data), request.hold_out, progress)

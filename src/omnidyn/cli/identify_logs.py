@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from omnidyn.cli.log_options import Maps, load_logs, log_files
+from omnidyn.cli.log_options import Maps, load_logs, refuse_missing
 from omnidyn.cli.terminal.identify_options import MOTORS, IdentifyRequest
 from omnidyn.cli.terminal.streams import say
 from omnidyn.files import open_regular
@@ -43,21 +43,34 @@ class Loaded(NamedTuple):
     folders: tuple[str, ...] = ()
 
 
-def table_kind(arguments: Sequence[str]) -> str:
+class LogFiles(NamedTuple):
+    """LOG...: as given, the files that it stands for, and the cells of the first line where it is one file."""
+
+    arguments: Sequence[str]
+    files: list[str]
+    names: set[str]
+
+    @classmethod
+    def of(cls, arguments: Sequence[str], files: list[str]) -> LogFiles:
+        """Raises InputError for a file that is not there, before anything slow is loaded."""
+        is_one = len(arguments) == 1 and not os.path.isdir(arguments[0])
+        if not is_one:
+            refuse_missing(files)
+        return cls(arguments, files, _first_names(files[0]) if is_one else set())
+
+
+def table_kind(names: Set[str]) -> str:
     """What LOG... is by the names of its columns: STEADY_TABLE axis,speed,force, MOTOR_TABLE input,speed[,motor], or
     "" for logs."""
     from omnidyn.logs.motor_table import is_motor_table
 
-    names = _first_names(arguments[0]) if len(arguments) == 1 else set()
     if "axis" in names and names & {"speed", "force"}:
         return STEADY_TABLE
     return MOTOR_TABLE if is_motor_table(names) else ""
 
 
 def _first_names(path: str) -> set[str]:
-    """The cells of the first line of a text file, in small letters; none of a folder."""
-    if os.path.isdir(path):
-        return set()
+    """The cells of the first line of a text file, in small letters."""
     with open_regular(path) as stream:
         text = stream.read(SNIFF_BYTES).decode("utf-8-sig", "replace")
     lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
@@ -67,29 +80,28 @@ def _first_names(path: str) -> set[str]:
 
 
 def load_data(
-    arguments: Sequence[str], request: IdentifyRequest, robot: Robot | None, reading: LogReading, progress: Progress
+    given: LogFiles, request: IdentifyRequest, robot: Robot | None, reading: LogReading, progress: Progress
 ) -> Loaded:
     """What LOG... holds: one table of steady points or of motors, else logs."""
     from omnidyn.logs.motor_table import read_motor_table
     from omnidyn.logs.steady_table import read_steady_table
 
-    kind = table_kind(arguments)
+    kind, path = table_kind(given.names), given.files[0]
     if kind == STEADY_TABLE and request.what != MOTORS:
-        table: SteadyTable | MotorTable = read_steady_table(arguments[0])
+        table: SteadyTable | MotorTable = read_steady_table(path)
     elif kind == MOTOR_TABLE and request.what == MOTORS and reading.options.rate is None:
-        table = read_motor_table(arguments[0])
+        table = read_motor_table(path)
     else:
-        return _load_runs(arguments, request, robot, reading, progress)
-    return Loaded(table, [], [{"role": "data", "name": arguments[0], "sha256": table.sha256}])
+        return _load_runs(given, request, robot, reading, progress)
+    return Loaded(table, [], [{"role": "data", "name": path, "sha256": table.sha256}])
 
 
 def _load_runs(
-    arguments: Sequence[str], request: IdentifyRequest, robot: Robot | None, reading: LogReading, progress: Progress
+    given: LogFiles, request: IdentifyRequest, robot: Robot | None, reading: LogReading, progress: Progress
 ) -> Loaded:
     """The runs of LOG... that belong to a group, where there are any; what the readers had to decide is said once."""
-    files = log_files(arguments)
-    folders = () if request.groups else _folders(arguments)
-    used_files = _of_groups(files, request.groups or folders, request.group_option)
+    folders = () if request.groups else _folders(given.arguments)
+    used_files = _of_groups(given.files, request.groups or folders, request.group_option)
     runs: list[Run] = []
     loaded, notes = Loaded(runs, [], [], folders), {}
     for path, log in load_logs(used_files, robot, reading.options, progress):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,6 @@ from omnidyn.cli.terminal.flags import with_flags
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import tell as tell_document
 from omnidyn.files import check_output, keep_apart, write_atomic
-from omnidyn.identification.methods import SteadyState
 from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
@@ -52,11 +51,13 @@ class Out:
         except Exception as error:
             self.refused.append(error)
 
-    def write_report(self, attempts: Attempts, render: Callable[[], str]) -> str:
+    def write_report(self, attempts: Attempts, result: Identification, record: Mapping[str, Any]) -> str:
         """Draw and write the report, with options as the command line writes them: its name where that worked."""
 
         def make() -> str:
-            write_atomic(self.report, with_flags(render()), self.force)
+            from omnidyn.report.identification_page import render_identification  # imported lazily: slow to load
+
+            write_atomic(self.report, with_flags(render_identification(result, record)), self.force)
             return self.report
 
         return attempts.make(PAGE, make) or ""
@@ -98,7 +99,7 @@ def tell(
     report = ""
     if to.report:
         progress(Report("drawing"))
-        report = to.write_report(attempts, lambda: _page(result, record))
+        report = to.write_report(attempts, result, record)
     progress(Report("writing"))
     files = [*to.files.values()]
     if of_points:
@@ -124,22 +125,6 @@ def _beside_plan(promises: Promises, result: Identification) -> Beside:
         return found
     say(f"omnidyn: the plan of --planned speaks of other numbers than this fit: {', '.join(promises)}")
     return {}
-
-
-def _page(result: Identification, record: dict[str, Any]) -> str:
-    """The report."""
-    if isinstance(result.method, SteadyState) and result.study is not None:
-        from omnidyn.report.steady_page import render_study
-
-        study: Any = result.study  # a SteadyStudy: this method makes no other
-        return render_study(study, record, verdict=result.verdict, verdicts=result.verdicts)
-    if isinstance(result.method, SteadyState):
-        from omnidyn.report.line_page import render_lines
-
-        return render_lines(result, record)
-    from omnidyn.report.fit_page import render_fit
-
-    return render_fit(result, record)
 
 
 def outputs(to: Out, names: Sequence[str], inputs: Sequence[Mapping[str, str]] = ()) -> dict[str, str]:

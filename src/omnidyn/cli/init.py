@@ -68,15 +68,15 @@ def init(
     _refuse_words(values, mecanum, friction, like, out, json)
     _refuse_numbers(values)
     path = _checked_path(name := name.removesuffix(".toml"), out, force)
-    log_options.keep_inputs(log, [like], [flags.map_file], "" if path == "-" else path)
-    log_options.refuse_missing(log)
+    files = log_options.keep_inputs(log, [like], [flags.map_file], "" if path == "-" else path)
+    log_options.refuse_missing(files)
     from omnidyn.cli import init_robot
 
     preset = omnidyn.load_robot(like) if like else None
     given_keys = [key for key, value in values.items() if value is not None]
     if not log and flags != NO_FLAGS:
         raise typer.BadParameter("--map, --column, --assume, --no-header, --rate, --max-bytes and --var are for --log.")
-    geometry = init_robot.from_logs(values, log, flags.options(), mecanum, bool(like)) if log else None
+    geometry = init_robot.from_logs(values, files, flags.options(), mecanum, bool(like)) if log else None
     robot = init_robot.robot_of(name, values, given_keys, preset, mecanum, friction, geometry)
     _write(robot.name, *init_robot.file_of(robot), path, force, json, like)
 

@@ -293,13 +293,13 @@ def file_of(robot: Robot) -> tuple[str, list[str]]:
     return f"{head}\n{robot_to_toml(robot)}", guessed(robot)
 
 
-def from_logs(values: dict[str, Any], log: list[str], options: LogOptions, mecanum: bool, copied: bool) -> Geometry:
+def from_logs(values: dict[str, Any], files: list[str], options: LogOptions, mecanum: bool, copied: bool) -> Geometry:
     """Azimuths and radii, of the robot where it turned, from logs; what is given on the command line stays.
 
     copied: the wheels are those of a preset, whose radius then tells the gear.
     """
     gear, runs, maps, at_motor = values["gear_ratio"], [], log_options.Maps(), set[str]()
-    for path, loaded in log_options.load_logs(log_options.log_files(log), None, replace(options, gear_ratio=gear)):
+    for path, loaded in log_options.load_logs(files, None, replace(options, gear_ratio=gear)):
         maps.show(path, loaded.columns)
         runs.append(loaded.to_run())
         at_motor |= {component_channel(key) for key, column in loaded.columns.columns.items() if column.at_motor}

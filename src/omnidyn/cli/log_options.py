@@ -181,21 +181,22 @@ def log_files(arguments: Sequence[str]) -> list[str]:
     return once
 
 
-def keep_inputs(logs: Sequence[str], robots: Sequence[str], other_files: Sequence[str], *outputs: str) -> None:
-    """Before anything slow is loaded: all that is read is there, and no result replaces it or another result.
+def keep_inputs(logs: Sequence[str], robots: Sequence[str], other_files: Sequence[str], *outputs: str) -> list[str]:
+    """The files of LOG.... Before anything slow is loaded: no result replaces what is read, or another result.
 
     other_files: files that are read beside logs and robots. --force or not. Raises InputError.
     """
-    files = [robot_path(robot) for robot in robots if robot]
+    used_files, files = log_files(logs), [robot_path(robot) for robot in robots if robot]
     for path in (path for path in other_files if path):
         with open_regular(path):
             files.append(path)
-    keep_apart(outputs, [*log_files(logs), *files])
+    keep_apart(outputs, [*used_files, *files])
+    return used_files
 
 
-def refuse_missing(logs: Sequence[str]) -> None:
+def refuse_missing(files: Sequence[str]) -> None:
     """Logs that are not there, before anything slow is loaded. Raises InputError."""
-    for path in log_files(logs):
+    for path in files:
         for file in files_of(path):
             with open_regular(file):
                 pass

@@ -198,9 +198,9 @@ def _with_band(
     """The summary, with what its band rests on."""
     if ends is None:
         return Document(lines, data, verdict=verdict)
-    from omnidyn.model.known.told import told
+    from omnidyn.model.known.told import uncertainty_of
 
-    uncertain = told(robot)
+    uncertain = uncertainty_of(robot)
     count = len(uncertain.keys)
     words = f"[..]: 95 %, {ends.draws} robots drawn from the std and correlations of {count} numbers of the file"
     sides = {"low": _last(ends.low), "high": _last(ends.high)}

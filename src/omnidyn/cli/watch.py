@@ -19,7 +19,6 @@ from omnidyn.cli.terminal.streams import say, show, show_line
 from omnidyn.cli.terminal.telling import end_failed, tell
 from omnidyn.document import sentence
 from omnidyn.errors import InputError
-from omnidyn.files import format_of, open_regular
 
 if TYPE_CHECKING:
     from omnidyn.identification.live.status import LiveStatus
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
 STDIN, UDP = "-", "udp:"
 PAUSE = 0.1  # [s] between two looks at a source
-MOST_BYTES, TAIL = 1 << 20, 256  # read at once; kept, to know a file again
+MOST_BYTES = 1 << 20  # read at once
 
 
 @reads_logs("sort", "rate", "var", "skip_bad_rows", "latency")
@@ -132,9 +131,11 @@ def _texts(source: str, idle: float) -> Iterator[str | None]:
 
 
 def _bytes(source: str) -> Iterator[bytes | None]:
+    from omnidyn.logs.growing import growth_of  # imported lazily: slow to load
+
     if source == STDIN:
         return _of_stdin()
-    return _of_socket(source) if source.startswith(UDP) else _of_file(source)
+    return _of_socket(source) if source.startswith(UDP) else growth_of(source)
 
 
 def _of_stdin() -> Iterator[bytes]:
@@ -143,38 +144,6 @@ def _of_stdin() -> Iterator[bytes]:
     number = sys.stdin.fileno()
     while data := os.read(number, MOST_BYTES):
         yield data
-
-
-def _of_file(path: str) -> Iterator[bytes | None]:
-    """What a file grows by; one that no longer ends as it did where it was read to is read from its start."""
-    with open_regular(path):
-        pass
-    kind = format_of(path)
-    if kind is not None:
-        raise InputError(
-            "only text can be read while it grows",
-            got=kind.name,
-            expected="a text file such as CSV, - or udp:PORT",
-            remedy="fit the whole file with identify, or let the logger write text too",
-            where=path,
-        )
-    place, before = 0, b""  # how far it was read, and the last bytes there
-    while True:
-        try:
-            with open(path, "rb") as file:
-                file.seek(place - len(before))
-                is_same = file.read(len(before)) == before
-                data = file.read(MOST_BYTES) if is_same else b""
-        except OSError:  # between two files of one name
-            is_same, data = True, b""
-        if not is_same:
-            place, before = 0, b""
-            yield None
-            continue
-        place, before = place + len(data), (before + data)[-TAIL:]
-        yield data
-        if not data:
-            time.sleep(PAUSE)
 
 
 def _of_socket(source: str) -> Iterator[bytes]:

@@ -21,7 +21,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Table, chance_cell, interval_cell, plain
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.keys import CENTRE, Key, expand, in_words, unit
-from omnidyn.model.known.told import Told, told
+from omnidyn.model.known.told import Told, uncertainty_of
 from omnidyn.model.robot import IDENTIFIED, Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.shown import FIGURE, Displayable, make
@@ -229,7 +229,7 @@ Fitted = Mapping[str, tuple[float, float, bool]]  # key -> value, std, whether i
 
 def _fitted(robot: Robot, name: str) -> Fitted:
     """The numbers of a robot that a fit found, each once: of a list that was one number, its first entry."""
-    uncertain = told(robot)
+    uncertain = uncertainty_of(robot)
     numbers = {}
     for k, key in enumerate(uncertain.keys):
         prior = robot.priors.get(key) or robot.priors.get(Key.parse(key).name)
@@ -280,7 +280,7 @@ def _together(robots: Sequence[Robot], fitted: Sequence[Fitted], keys: Sequence[
     total, pulled, chi2, degrees = np.zeros((len(keys), len(keys))), np.zeros(len(keys)), 0.0, 0
     for robot, numbers in zip(robots, fitted, strict=True):
         std = np.array([numbers[key][1] for key in keys])
-        weight, rank = _inverse(_correlation(told(robot), keys) * np.outer(std / unit_, std / unit_))
+        weight, rank = _inverse(_correlation(uncertainty_of(robot), keys) * np.outer(std / unit_, std / unit_))
         off = (np.array([numbers[key][0] for key in keys]) - first) / unit_
         total, pulled = total + weight, pulled + weight @ off
         chi2, degrees = chi2 + float(off @ weight @ off), degrees + rank

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from omnidyn.comparison.replay import HOLD, replay
 from omnidyn.comparison.result import Comparison
-from omnidyn.model.known.told import told
+from omnidyn.model.known.told import uncertainty_of
 from omnidyn.model.known.uncertainty import DRAWS, plausible
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
@@ -38,7 +38,7 @@ def with_bands(
     bands: dict[str, Mapping[int, Band]] = {}
     warnings, guessed = [], {}
     for name, robot in zip(comparison.robots, robots, strict=True):
-        uncertain = told(robot)
+        uncertain = uncertainty_of(robot)
         if not uncertain.keys:
             warnings.append(Statement("no_band", subject=name))
             continue
@@ -65,7 +65,7 @@ def with_fitted_band(comparison: Comparison, robot: Robot, log: int = 0) -> Comp
     that slopes are taken from have one step a row, as those of the fit. No band where no number has a std.
     """
     (name,) = comparison.robots
-    if not told(robot).keys:
+    if not uncertainty_of(robot).keys:
         return comparison
     run = comparison.simulated[name][log]
     band = first_order_band(

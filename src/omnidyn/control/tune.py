@@ -38,7 +38,7 @@ from omnidyn.control.readings import with_sensors
 from omnidyn.control.tracking import Tracking
 from omnidyn.document import Document, Part, Points, Table, all_of, plain
 from omnidyn.errors import InputError
-from omnidyn.model.known.told import told as known_errors
+from omnidyn.model.known.told import uncertainty_of
 from omnidyn.model.known.uncertainty import plausible
 from omnidyn.model.robot import Robot
 from omnidyn.model.value import PerWheel
@@ -261,7 +261,7 @@ def tune(
     spec = controller_spec(controller)
     start = _start(spec, robot, around.dt)
     follow, judged = [[path_named(item) for item in paths]] * 2 if paths else _paths(robot)
-    uncertain = bool(known_errors(robot).keys)
+    uncertain = bool(uncertainty_of(robot).keys)
     training, held_out = (
         _variants(
             plausible(robot, draws, k) if uncertain else _near(robot, draws, k, 0.0 if kit.odometry else RADIUS), kit

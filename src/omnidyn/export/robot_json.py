@@ -16,7 +16,7 @@ from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.files import parse_toml
 from omnidyn.model.keys import TABLES, unit
-from omnidyn.model.known.told import told
+from omnidyn.model.known.told import uncertainty_of
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import robot_to_toml
 from omnidyn.model.value import keys_of
@@ -28,7 +28,7 @@ SCHEMA_FILE = f"robot-export-{VERSION}.schema.json"
 def robot_json(robot: Robot) -> Export:
     """The robot as JSON: the tree of its file, and the covariance of the numbers that have a std."""
     refuse("json", robot)
-    uncertain = told(robot)
+    uncertain = uncertainty_of(robot)
     covariance = uncertain.std[:, None] * uncertain.correlation * uncertain.std[None, :]
     document = {
         "format": FORMAT,

@@ -13,22 +13,27 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.arguments import check_order
+from omnidyn.findings.averaged import check_averaged
 from omnidyn.findings.energy import check_energy
 from omnidyn.findings.excitation import check_excitation, joined, judge
-from omnidyn.findings.filters import check_averaged, check_filters
-from omnidyn.findings.finding import Finding, Use, Verdict, in_order, merged, with_guesses
+from omnidyn.findings.filters import check_filters
+from omnidyn.findings.finding import Finding, Use, Verdict, in_order, merged
 from omnidyn.findings.finding import joined as joined_uses
 from omnidyn.findings.fitness import USES, uses
+from omnidyn.findings.guessed import with_guesses
 from omnidyn.findings.limits import check_limits
-from omnidyn.findings.motion import check_motion, check_oddities
+from omnidyn.findings.motion import check_motion
+from omnidyn.findings.oddities import check_oddities
 from omnidyn.findings.scale.derivatives import check_derivatives
 from omnidyn.findings.scale.lag import check_lag
-from omnidyn.findings.scale.scale import check_dead_wheels, check_scale, check_turn_rate
+from omnidyn.findings.scale.scale import check_dead_wheels, check_scale
+from omnidyn.findings.scale.turn_rate import check_turn_rate
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.slip import check_axes, check_slip
 from omnidyn.findings.time_base import begin, between
 from omnidyn.findings.values.copies import check_copies
-from omnidyn.findings.values.values import check_echo, check_values
+from omnidyn.findings.values.echoes import check_echo
+from omnidyn.findings.values.values import check_values
 from omnidyn.findings.wiring.against_drive import check_against_drive
 from omnidyn.findings.wiring.twist_frame import check_twist_frame
 from omnidyn.findings.wiring.wheels import check_wiring
@@ -111,7 +116,7 @@ def check_log(log: Log, robot: Robot | None = None) -> Verdict:
     length = float(work.t[-1] - work.t[0]) if len(work) > 1 else 0.0
     return Verdict(
         in_order(findings),
-        work.known.get("excitation", {}),
+        work.facts.get("excitation", {}),
         len(log),
         length,
         1.0 / work.step if work.step > 0.0 else 0.0,

@@ -52,7 +52,7 @@ def excitation(work: LogUnderCheck) -> dict[str, float]:
     level = smooth(twist, width) * [1.0, 1.0, length]
     size = np.sqrt(np.nansum(level**2, axis=1))
     top = float(np.quantile(size, 0.95))
-    rests = top <= 0.0 or work.known.get("at_rest", False)
+    rests = top <= 0.0 or work.facts.get("at_rest", False)
     moving = np.zeros(len(size), dtype=bool) if rests else size > 0.1 * top
     measures = {"time_s": float(work.t[-1] - work.t[0]), "moving": float(moving.mean())}
     if not moving.any():

@@ -182,7 +182,7 @@ def _contrast(
     rows = (ids >= starts[k]) & (ids < ends[k])
     if inside > outside:  # then the rest is what slips
         inside, outside, rows = outside, inside, ~rows
-    least_deviation = LEAST_DEVIATION if work.known.get("dead_wheel") is None else STAND_IN
+    least_deviation = LEAST_DEVIATION if work.facts.get("dead_wheel") is None else STAND_IN
     if significance[k] < SURE_ERRORS or not 0.1 < outside < 2.0 or (outside - inside) / outside < least_deviation:
         return None
     if inside < SPINS * outside and not 0.5 < (d_in[k] / b_in[k]) / (d_out[k] / b_out[k]) < 2.0:

@@ -9,5 +9,5 @@ answers: lack_of_fit, stability), validation (free runs beside the logs), force_
 friction_curve (force against speed), ladder (its steps as values), advice (what to do next), and fit_document (all of
 it as tables and words). planning/ says which experiment tells most, live/ what a log
 tells while it grows. first_runs makes whatever the compiler is needed for.
-fingerprints: whether two logs are one recording.
+fingerprints: whether two logs are one recording. origin: what a result was made from.
 """

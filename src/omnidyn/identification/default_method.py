@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,17 +50,22 @@ def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
     return why_no_transient(runs, robot)
 
 
-def default_method(
-    runs: Sequence[Run], robot: Robot, hold_out: Sequence[str], progress: Progress
-) -> tuple[Method, str]:
-    """(the method that robot and logs support, why it is not output error, "" where it is); `progress` hears why.
+class Choice(NamedTuple):
+    """A method, and why it is not the one by default: in words, "" where it is, or where it was asked for."""
+
+    method: Method | None
+    reason: str = ""
+
+
+def default_method(runs: Sequence[Run], robot: Robot, hold_out: Sequence[str], progress: Progress) -> Choice:
+    """The method that robot and logs support; `progress` hears why it is not output error.
 
     hold_out: of `identify`; only output error predicts logs.
     """
     reason = "" if hold_out else why_not_output_error(runs, robot)
     if reason:
         progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {reason}", urgent=True))
-    return (SteadyState() if reason else OutputError()), reason
+    return Choice(SteadyState() if reason else OutputError(), reason)
 
 
 def default_motor_method(runs: Sequence[Run], input: str, progress: Progress) -> MotorFit | MotorLine:

@@ -19,6 +19,7 @@ from omnidyn.identification.methods import (
     Method,
     OutputError,
 )
+from omnidyn.identification.origin import Origin
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.fit import ALL_LOGS
 from omnidyn.identification.steady.group_numbers import Difference
@@ -61,7 +62,7 @@ class Identification(Displayable):
 
     method: that was taken. groups: name -> Estimate; one, "all", where there are no groups; none of motors. study: by
     steady state, but for the shape "line", or of motors. interrupted: whether an interrupt cut the fit off. follow:
-    makes what follows the fit, when it is first asked for.
+    makes what follows the fit, when it is first asked for. origin: what it was made from, see `provenance`.
     """
 
     method: Method
@@ -70,6 +71,7 @@ class Identification(Displayable):
     differences: tuple[Difference, ...] = ()
     study: SteadyStudy | MotorStudy | None = None
     interrupted: bool = False
+    origin: Origin | None = None
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -113,6 +115,15 @@ class Identification(Displayable):
     def after(self) -> After:
         """What follows the fit, made when it is first asked for."""
         return self.follow()
+
+    @cached_property
+    def provenance(self) -> dict[str, Any]:
+        """What it was made from: the version, which holds the seeds of all draws too, the call, the inputs and hashes.
+
+        That of a robot is of its file, that of a log the mark by which a robot file knows it again (`[log] of`), that
+        of a table of the file it was read from.
+        """
+        return self.origin.to_dict() if self.origin else {}
 
     @property
     def validations(self) -> Mapping[str, Validation]:

@@ -11,12 +11,12 @@ from typing import Any
 from omnidyn.arguments import MADE_BY, check_order, is_frame
 from omnidyn.attempts import BY_QUICK, COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, Attempts
 from omnidyn.errors import INTERRUPTS, InputError, told_by
-from omnidyn.findings.finding import Verdict, rest_on_guesses
+from omnidyn.findings.finding import Verdict
 from omnidyn.findings.fitness import STEADY as STEADY_USE
+from omnidyn.findings.guessed import rest_on_guesses
 from omnidyn.identification.advice import advice
-from omnidyn.identification.default_method import as_driven, default_method, why_not_output_error
+from omnidyn.identification.default_method import Choice, as_driven, default_method, why_not_output_error
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.fingerprints import fingerprint
 from omnidyn.identification.grouping import held_out, names_of_groups
 from omnidyn.identification.identification import After, Identification
 from omnidyn.identification.log_verdicts import judged_by_fit, log_verdicts, told_why, verdict_advice
@@ -35,6 +35,7 @@ from omnidyn.identification.methods import (
     SteadyState,
     refuse_unless_method,
 )
+from omnidyn.identification.origin import Origin
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import ALL_LOGS, Fit
 from omnidyn.identification.output_error.solve.progress import FitProgress
@@ -49,6 +50,7 @@ from omnidyn.logs.motor_table import MotorTable
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.drive import SPEED
 from omnidyn.model.keys import EMF, TORQUE, Key, expand, find_key, with_priors
+from omnidyn.model.log_effects import log_mark
 from omnidyn.model.robot import GUESS, Prior, Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
@@ -62,7 +64,7 @@ SLOW_RATIO, SLOW_SECONDS = 5.0, 2.0  # times the fit; [s]: a diagnosis that take
 def identify(
     logs: Logs,
     robot: Robot | None = None,
-    method: Method | None = None,
+    method: Method | Choice | None = None,
     *,
     hold_out: str | Sequence[str] = (),
     groups: str | Sequence[str] | None = None,
@@ -80,8 +82,9 @@ def identify(
         logs: one or several of `read_log`; those read with `recorded=True` are checked as well. Or a table of steady
             points, `read_steady_table`, or of motors.
         robot: where the fit starts; what is not fitted is taken as it is. Motors need none.
-        method: `OutputError`, `SteadyState`, `MotorLine` or `MotorFit`, with their options. None: output error where
-            robot and logs support it, else steady state; a note says why. The line of motors for a table of motors.
+        method: `OutputError`, `SteadyState`, `MotorLine` or `MotorFit`, with their options; or the Choice of
+            `default_method`. None: output error where robot and logs support it, else steady state; a note says why.
+            The line of motors for a table of motors.
         hold_out: globs, or folders, of the sources of runs that are not fitted but predicted.
         groups: NAME=GLOB each, of the sources of runs, or a name for every run: logs with friction of their own, such
             as those of a floor or a load.
@@ -104,29 +107,33 @@ def identify(
     True
     """
     check_order("identify(logs, robot)", (logs, (Run, Log, SteadyTable, MotorTable)), (robot, (Robot, type(None))))
+    method, reason = method if isinstance(method, Choice) else Choice(method)
     refuse_unless_method(method)
-    request = _Request(
-        robot,
-        groups,
-        (hold_out,) if isinstance(hold_out, str) else tuple(hold_out),
-        quick,
-        progress,
-        save or _discard,
-        Attempts(keep=keep_best),
-    )
+    hold_out = (hold_out,) if isinstance(hold_out, str) else tuple(hold_out)
+    request = _Request(robot, groups, hold_out, quick, progress, save or _discard, Attempts(keep=keep_best))
+    data: Sequence[Run] | SteadyTable | MotorTable
     if isinstance(logs, SteadyTable):
-        return _of_steady_table(logs, method or SteadyState(), request)
-    if isinstance(logs, MotorTable):
-        return _of_motors(logs, method or MotorLine(), (), request)
-    given_logs: list[Any] = [logs] if isinstance(logs, Run | Log) or is_frame(logs) else list(logs)
-    runs = as_list([log.to_run() if isinstance(log, Log) else log for log in given_logs])
-    check = check or [log for log in given_logs if isinstance(log, Log)]
+        data, result = logs, _of_steady_table(logs, method or SteadyState(), request)
+    elif isinstance(logs, MotorTable):
+        data, result = logs, _of_motors(logs, method or MotorLine(), (), request)
+    else:
+        given_logs: list[Any] = [logs] if isinstance(logs, Run | Log) or is_frame(logs) else list(logs)
+        data = as_list([log.to_run() if isinstance(log, Log) else log for log in given_logs])
+        check = check or [log for log in given_logs if isinstance(log, Log)]
+        result = _of_runs(data, Choice(method, reason), check, request)
+    options = {HOLD_OUT: hold_out, GROUPS: groups, QUICK: quick}
+    return replace(result, origin=Origin(data, robot, result.method, options))
+
+
+def _of_runs(runs: Sequence[Run], choice: Choice, check: Sequence[Log], request: _Request) -> Identification:
+    """A robot, or the motors, of some logs."""
+    method, reason = choice
     if isinstance(method, MOTOR_METHODS):
         return _of_motors(runs, method, check, request)
-    reason = ""
     request = replace(request, robot=as_driven(request.of_friction(), runs))
     if method is None:
-        method, reason = default_method(runs, request.of_friction(), request.hold_out, progress)
+        method, reason = default_method(runs, request.of_friction(), request.hold_out, request.progress)
+    assert method is not None
     request.refuse(method)
     if isinstance(method, SteadyState):
         identification = _steady(runs, method, check, request)
@@ -136,12 +143,14 @@ def identify(
     if not reason:
         return identification
     choice_note = Statement("method_chosen", NOTE, numbers={"method": method.name, "why": reason})
+    study = identification.study
     return replace(
         identification,
         groups={
             name: replace(estimate, warnings=(choice_note, *estimate.warnings))
             for name, estimate in identification.groups.items()
         },
+        study=study and replace(study, warnings=(choice_note, *study.warnings)),
     )
 
 
@@ -374,7 +383,7 @@ def _of_group(name: str, groups: Collection[str]) -> str:
 
 def _not_independent(runs: Sequence[Run], held_mask: Sequence[bool]) -> list[Statement]:
     """Held-out logs that are fitted too, under another name: they prove nothing."""
-    marks = [fingerprint(run) for run in runs] if any(held_mask) else []
+    marks = [log_mark(run) for run in runs] if any(held_mask) else []
     fitted = {
         mark: run.source for mark, run, is_held_out in zip(marks, runs, held_mask, strict=False) if not is_held_out
     }

@@ -9,7 +9,8 @@ from typing import Any
 
 from omnidyn.errors import InputError
 from omnidyn.findings.check import check_log
-from omnidyn.findings.finding import Finding, Verdict, gone_by_fit, judged_again, rest_on_guesses
+from omnidyn.findings.finding import Finding, Verdict
+from omnidyn.findings.guessed import gone_by_fit, judged_again, rest_on_guesses
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report

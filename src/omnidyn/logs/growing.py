@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import re
 import tempfile
+import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from omnidyn.errors import InputError
+from omnidyn.files import format_of, open_regular
 from omnidyn.logs.clock.clock import Clock
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.read_log import LogOptions, log_from_table, map_columns
@@ -28,6 +31,44 @@ MOST_BYTES = 1 << 20  # of a line that does not end
 BROKEN = "\0"  # in its place
 BINARY = re.compile(r"[\x00-\x08\x0e-\x1f]")  # what no line of text holds, such as zeros after a loss of power
 TURN = 2.0 * np.pi
+PAUSE = 0.1  # [s] between two looks at a file
+AT_ONCE, TAIL = 1 << 20, 256  # bytes that are read; that are kept, to know a file again
+
+
+def growth_of(path: str) -> Iterator[bytes | None]:
+    """What a file grows by, b"" where it does not, without end; one that no longer ends as it did where it was read to
+    is read from its start, after None.
+
+    Raises InputError for what is no text.
+    """
+    with open_regular(path):
+        pass
+    kind = format_of(path)
+    if kind is not None:
+        raise InputError(
+            "only text can be read while it grows",
+            got=kind.name,
+            expected="a text file such as CSV, - or udp:PORT",
+            remedy="fit the whole file with identify, or let the logger write text too",
+            where=path,
+        )
+    place, before = 0, b""  # how far it was read, and the last bytes there
+    while True:
+        try:
+            with open(path, "rb") as file:
+                file.seek(place - len(before))
+                is_same = file.read(len(before)) == before
+                data = file.read(AT_ONCE) if is_same else b""
+        except OSError:  # between two files of one name
+            is_same, data = True, b""
+        if not is_same:
+            place, before = 0, b""
+            yield None
+            continue
+        place, before = place + len(data), (before + data)[-TAIL:]
+        yield data
+        if not data:
+            time.sleep(PAUSE)
 
 
 class GrowingTable:

@@ -39,7 +39,7 @@ def draw_friction(studies: Mapping[str, FrictionStudy], axis: int = 0) -> Pictur
             panels[0].plot([0.0, 0.0], [-curves.holds[1], curves.holds[0]], color=colour, linestyle=line)
             milli = 1e3
             if curves.bends > 0.0:
-                panels[1].plot(curves.way * milli, curves.loop, color=colour, linestyle=line)
+                panels[1].plot(curves.travel * milli, curves.loop, color=colour, linestyle=line)
             else:
                 panels[1].plot([0.0, 0.0], [-curves.holds[1], curves.holds[0]], color=colour, linestyle=line)
             panels[2].plot(curves.rate, curves.breakaway, color=colour, linestyle=line, marker=".")

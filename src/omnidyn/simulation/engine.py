@@ -236,7 +236,7 @@ class Coulomb(_Stepping):
                 push,
                 bound=rows.bound,
             )
-        twists, poses = seen.twist[0], seen.way[0][:, [PATH, PATH + 1, 0]]
+        twists, poses = seen.twist[0], seen.travel[0][:, [PATH, PATH + 1, 0]]
         twists[0], poses[0] = twist, pose
         volts, loop_volts = self._volts(rows, looped)
         return Motion(self._after(state, (twists[-1], step), poses[-1], rows, None), twists, poses, volts, loop_volts)

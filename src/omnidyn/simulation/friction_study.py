@@ -51,7 +51,7 @@ class AxisFriction:
     force: FloatArray
     holds: tuple[float, float]
     bends: float
-    way: FloatArray
+    travel: FloatArray
     loop: FloatArray
     rate: FloatArray
     breakaway: FloatArray
@@ -94,10 +94,10 @@ def _axis(robot: Robot, numbers: Plant, k: int, top: float, pattern: FloatArray,
     speed = np.concatenate([-side[::-1], side])
     force = -sliding_wrench(robot, speed[:, None] * np.eye(N_AXES)[k])[:, k]
     unit = float(numbers.body.length) if k == 2 else 1.0
-    way, loop, bends = _loop(numbers, k, unit)
+    travel, loop, bends = _loop(numbers, k, unit)
     rate, breakaway = _ramps(robot, numbers, k, pattern, volts, bends > 0.0)
     return AxisFriction(
-        AXES[k], UNITS[k], _law(robot, k), speed, force, _holds(numbers, k, unit), bends, way, loop, rate, breakaway
+        AXES[k], UNITS[k], _law(robot, k), speed, force, _holds(numbers, k, unit), bends, travel, loop, rate, breakaway
     )
 
 
@@ -135,17 +135,17 @@ def _loop(numbers: Plant, k: int, unit: float) -> tuple[FloatArray, FloatArray, 
     if bends == 0.0:
         return np.zeros(0), np.zeros(0), 0.0
     reach, step = BENT * bends, np.linspace(0.0, 1.0, POINTS)
-    way = np.concatenate([reach * step, reach * (1.0 - 2.0 * step), reach * (2.0 * step - 1.0)])
-    force = np.zeros(len(way))
+    travel = np.concatenate([reach * step, reach * (1.0 - 2.0 * step), reach * (2.0 * step - 1.0)])
+    force = np.zeros(len(travel))
     for g, level, record, law in parts:
-        force += abs(g) * _slow(way * abs(g), level, record, law)
-    return way / unit, force * unit, bends / unit
+        force += abs(g) * _slow(travel * abs(g), level, record, law)
+    return travel / unit, force * unit, bends / unit
 
 
-def _slow(way: FloatArray, level: FloatArray, record: Any, law: Any) -> FloatArray:
-    """Force [N] of one part along a way [m] that is gone slowly, by the closed form of its law for each half loop."""
-    out, z, before, stiff = np.zeros(len(way)), 0.0, way[0], float(record.stiffness)
-    for j, x in enumerate(way):
+def _slow(travel: FloatArray, level: FloatArray, record: Any, law: Any) -> FloatArray:
+    """Force [N] of one part along a slow travel [m], by the closed form of its law for each half loop."""
+    out, z, before, stiff = np.zeros(len(travel)), 0.0, travel[0], float(record.stiffness)
+    for j, x in enumerate(travel):
         distance = x - before
         limit = level[0] if distance >= 0.0 else level[1]
         side = 1.0 if distance >= 0.0 else -1.0
@@ -232,7 +232,7 @@ def _notes(robot: Robot, axes: Sequence[AxisFriction]) -> list[Statement]:
 
 def _row(axis: AxisFriction) -> tuple[str, ...]:
     middle, unit = len(axis.speed) // 2, axis.unit
-    way = "" if axis.bends == 0.0 else f"{axis.bends * 1e3:.3g} {'mrad' if unit == 'N m' else 'mm'}"
+    bend = "" if axis.bends == 0.0 else f"{axis.bends * 1e3:.3g} {'mrad' if unit == 'N m' else 'mm'}"
     holds = f"{axis.holds[0]:.4g}" + ("" if axis.holds[0] == axis.holds[1] else f", back {axis.holds[1]:.4g}")
     ramps = ", ".join(f"{value:.4g}" for value in axis.breakaway) if np.isfinite(axis.breakaway).all() else "-"
     return (
@@ -241,7 +241,7 @@ def _row(axis: AxisFriction) -> tuple[str, ...]:
         f"{holds} {unit}",
         f"{axis.force[middle]:.4g}",
         f"{axis.force[-1]:.4g}",
-        way,
+        bend,
         ramps,
     )
 
@@ -256,7 +256,7 @@ def _told(axis: AxisFriction) -> dict[str, Any]:
         "force": axis.force.tolist(),
         "holds": list(axis.holds),
         "bends": axis.bends,
-        "way": axis.way.tolist(),
+        "way": axis.travel.tolist(),
         "loop": axis.loop.tolist(),
         "rate": axis.rate.tolist() if finite else None,
         "breakaway": axis.breakaway.tolist() if finite else None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -111,6 +111,14 @@ def check(log: LogFile, robot: str) -> tuple[str, str]:
     return shlex.join(words), f"{made}omnidyn.check({log.python(variable)}{variable and ', robot'})"
 
 
+def watch(log: LogFile, robot: str, within: float) -> tuple[str, str]:
+    """Command line and Python call that watch a log while it grows. within: half an interval that is enough [%]."""
+    name, variable, made = _robot(robot)
+    words = ["omnidyn", "watch", log.name, *_flag(name), *log.flags, "--within", f"{within:g}"]
+    python = f"{made}omnidyn.Live({variable}, within={within / 100.0:g}).add({log.run_python(variable)}).verdict"
+    return shlex.join(words), python
+
+
 def align(log: LogFile, other: LogFile, robot: str) -> tuple[str, str]:
     """Command line and Python call that put another log on the clock of a log."""
     name, variable, made = _robot(robot)
@@ -120,18 +128,30 @@ def align(log: LogFile, other: LogFile, robot: str) -> tuple[str, str]:
     return "\n".join([*lines, shlex.join(words)]), python
 
 
-def fit(logs: Sequence[LogFile], held_out: Sequence[LogFile], robot: str, free: Sequence[str]) -> tuple[str, str]:
-    """Command line and Python call that fit a robot to logs. free: keys, none for the default."""
+def fit(
+    logs: Sequence[LogFile],
+    held_out: Sequence[LogFile],
+    robot: str,
+    free: Sequence[str],
+    groups: Mapping[str, str] | None = None,
+) -> tuple[str, str]:
+    """Command line and Python call that fit a robot to logs.
+
+    free: keys, none for the default. groups: key of each log -> its group; none where there are no groups.
+    """
+    groups = groups or {}
     name, variable, made = _robot(robot)
     lines, names, flags = named(logs, name)
     words = ["omnidyn", "identify", *names.values(), *_flag(name)]
     words += [word for log in held_out for word in ("--hold-out", glob.escape(names[log.key]))]
+    words += [word for key, group in groups.items() for word in ("--per", f"{group}={glob.escape(names[key])}")]
     words += [word for key in free for word in ("--free", key)]
     words += [*flags, "-o", "fitted.toml", "--report", "report.html"]
     method = f", omnidyn.OutputError(free={tuple(free)!r})" if free else ""
     held = f", hold_out={[glob.escape(log.name) for log in held_out]!r}" if held_out else ""
+    of_groups = f", groups={[groups[log.key] for log in logs]!r}" if groups else ""
     given = ", ".join(log.python(variable) for log in logs)
-    return "\n".join([*lines, shlex.join(words)]), f"{made}omnidyn.identify([{given}], robot{method}{held})"
+    return "\n".join([*lines, shlex.join(words)]), f"{made}omnidyn.identify([{given}], robot{method}{held}{of_groups})"
 
 
 def compare(logs: Sequence[LogFile], robots: Sequence[str]) -> tuple[str, str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -45,16 +45,19 @@ def listener(tell: Tell) -> Callable[[Report], None]:
 
 
 @contextlib.contextmanager
-def timed(tell: Tell) -> Iterator[Callable[[Report], None]]:
+def timed(tell: Tell, parts: Sequence[str] = ()) -> Iterator[Callable[[Report], None]]:
     """A listener of the library that tells the page, beside what is done, the time spent and left, also in silence.
 
     Time left: of a phase that counts, as it went so far. The page hears of a kernel that is being compiled.
+    parts: how the phases of each part of the job begin; the page hears which of them it is.
     """
     begun, phase, latest, finished = time.monotonic(), [time.monotonic()], [Report("")], threading.Event()
+    part = [0]
 
     def listen(report: Report) -> None:
         if report.phase != latest[0].phase:
             phase[0] = time.monotonic()
+        part[0] = max(part[0], part_of(report.phase, parts))
         latest[0] = report
 
     with heard() as compiling:
@@ -64,7 +67,8 @@ def timed(tell: Tell) -> Iterator[Callable[[Report], None]]:
                 report, now = latest[0], time.monotonic()
                 share = report.done / report.total if report.total else None
                 left = (now - phase[0]) * (1.0 - share) / share if share else None
-                words = str(report) + COMPILING * bool(compiling.under_way)
+                place = f"part {part[0]} of {len(parts)}: " if part[0] else ""
+                words = f"{place}{report}{COMPILING * bool(compiling.under_way)}"
                 tell("progress", {"text": words, "share": share, "spent": now - begun, "left": left})
 
         teller = threading.Thread(target=beat, daemon=True)
@@ -74,6 +78,11 @@ def timed(tell: Tell) -> Iterator[Callable[[Report], None]]:
         finally:
             finished.set()
             teller.join()
+
+
+def part_of(phase: str, parts: Sequence[str]) -> int:
+    """The number of the part that a phase belongs to, from 1; 0 for none."""
+    return next((k for k, begin in enumerate(parts, 1) if phase.startswith(begin)), 0)
 
 
 def robot_of(request: Mapping[str, Any]) -> Robot | None:

@@ -20,6 +20,7 @@ from omnidyn.studio.compare.job import compare, drift
 from omnidyn.studio.drive.job import drive
 from omnidyn.studio.fit.job import fit, free_keys, warm
 from omnidyn.studio.job import Tell
+from omnidyn.studio.live.job import watch
 from omnidyn.studio.log.job import align, check, example, save_columns
 from omnidyn.studio.robot.job import check_robot
 from omnidyn.studio.track.job import track
@@ -38,6 +39,7 @@ JOBS: dict[str, Callable[[Mapping[str, Any], Tell, Any], dict[str, Any]]] = {
     "track": track,
     "compare": compare,
     "drift": drift,
+    "watch": watch,
 }
 
 
@@ -50,7 +52,10 @@ def main() -> None:
     working = threading.Event()
 
     def tell(kind: str, value: Any) -> None:
-        out.write(json.dumps({kind: value}).encode() + b"\n")
+        try:
+            out.write(json.dumps({kind: value}).encode() + b"\n")
+        except BrokenPipeError:  # the server is gone: nobody waits for the job
+            os._exit(0)
 
     def read() -> None:
         for line in sys.stdin.buffer:

@@ -17,6 +17,7 @@ from omnidyn.studio.drive.state import Driving
 from omnidyn.studio.drive.tab import DriveTab
 from omnidyn.studio.fit.state import Fitting
 from omnidyn.studio.fit.tab import FitTab
+from omnidyn.studio.live.state import Watching
 from omnidyn.studio.log.tab import LogTab
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import FIT, LOGS, PROGRESS, ROBOT
@@ -44,6 +45,7 @@ class Studio:
         self.session = Session()
         self.fitting, self.driving = Fitting(self.session), Driving(self.session)
         self.tracks, self.comparing = Tracks(self.session), Comparing(self.session)
+        self.watching = Watching(self.session)
 
         self.session.takers[workspace.SUFFIX] = self.open
 
@@ -71,7 +73,7 @@ class Studio:
     def tabs(self, page: Page) -> dict[str, Any]:
         """The tabs of a page, by name."""
         return {
-            "Log": LogTab(page),
+            "Log": LogTab(page, self.watching),
             "Robot": RobotTab(page),
             "Fit": FitTab(page, self.fitting),
             "Drive": DriveTab(page, self.driving),

@@ -165,7 +165,8 @@ class Page:
 
         def words() -> None:
             if task().running:
-                left = "" if task().left is None else f", about {task().left:.0f} s left"
+                left = "" if task().left is None else f", about {task().left:.0f} s left of this"
+                left += "" if task().before is None else f"; the last one took {task().before:.0f} s"
                 with ui.row().classes("line"):
                     ui.spinner(size="1.2em")
                     words = "cancelling" if task().cancelling else task().progress

@@ -54,19 +54,20 @@ class Files:
 
 def script(fitting: Fitting, others: Mapping[str, Task]) -> str:
     """The Python file. others: name -> the last comparison, drift and tracking, which have calls of their own."""
-    session, files, lines = fitting.session, Files(), list[str]()
-    for name in fitting.history:
-        recipe, stem = fitting.recipes.get(name), name.removesuffix(".toml")
-        note = fitting.notes.get(name, "")
-        lines += ["", f"print({f'{stem}: {note}' if note else stem!r})"]
+    session, files, lines, last = fitting.session, Files(), list[str](), None
+    for name, kept in fitting.history.items():
+        recipe, stem = kept.recipe, name.removesuffix(".toml")
+        lines += ["", f"print({f'{stem}: {kept.note}' if kept.note else stem!r})"]
         if recipe is None:
             lines.append("print('opened with a workspace: how it was made is not known')")
             lines.append(f"Path({name!r}).write_text({Path(session.robots[name]).read_text('utf-8')!r}, 'utf-8')")
             continue
-        *before, call = _python(recipe, files, session.presets, stem).splitlines()
-        lines += [*before, f"fit = {call}", "print(fit.headline)"]
-        lines.append("print({name: float(value) for name, value in fit.estimate.value.items()})")
-        lines.append(f"omnidyn.save_robot(fit.estimate.robot, {name!r}, force=True)")
+        if recipe is not last:  # else another group of the same fit
+            *before, call = _python(recipe, files, session.presets, stem).splitlines()
+            lines += [*before, f"fit = {call}", "print(fit.headline)"]
+        last, estimate = recipe, f"fit.groups[{kept.group!r}]" if kept.group else "fit.estimate"
+        lines.append(f"print({{name: float(value) for name, value in {estimate}.value.items()}})")
+        lines.append(f"omnidyn.save_robot({estimate}.robot, {name!r}, force=True)")
     for name, task in others.items():
         if task.python and task.result is not None:
             python = task.python
@@ -84,4 +85,4 @@ def _python(recipe: Recipe, files: Files, presets: Iterable[str], of: str) -> st
     logs = {log.key: files.log(log, of) for log in recipe.logs}
     held_out = [logs[log.key] for log in recipe.held_out]
     robot = files.robot(recipe.path, presets, of)
-    return calls.fit([*logs.values()], held_out, robot, recipe.free)[1]
+    return calls.fit([*logs.values()], held_out, robot, recipe.free, recipe.groups)[1]

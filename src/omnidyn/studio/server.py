@@ -38,6 +38,7 @@ ROBOT_FILE = re.compile(r"[^/\\]+\.toml", re.IGNORECASE)
 TRIES = 20  # ports from the one asked for
 FIT_FILES = {"robot.toml": "text/plain", "numbers.csv": "text/csv", "report.html": "text/html"}
 NO_SCRIPT = "default-src 'none'; style-src 'unsafe-inline'; img-src data: 'self'; frame-ancestors 'none'"
+RECONNECT = 30.0  # [s] that a page without a connection keeps what it shows; after that it is loaded anew
 UNDER_WAY = 30  # frames of a drive that a page has not had yet: half a second
 MESSAGE_BYTES = 65_536  # of what a page sends over a socket
 CLOSED = (WebSocketDisconnect, RuntimeError)  # how a socket says that its page is gone
@@ -117,7 +118,7 @@ def application(studio: Studio, files: list[str]) -> FastAPI:
     def page(tab: str = "") -> None:
         show(studio, tab)
 
-    ui.run_with(app, title="omnidyn studio", dark=None, show_welcome_message=False)
+    ui.run_with(app, title="omnidyn studio", dark=None, show_welcome_message=False, reconnect_timeout=RECONNECT)
     return app
 
 
@@ -253,6 +254,6 @@ def _add_sockets(app: FastAPI, studio: Studio) -> None:
 def _take(driving: Driving, command: Any) -> None:
     """A command of a page, as far as it is one."""
     if isinstance(command, dict):
-        known = {name: command[name] for name in ("axes", "level", "offset", "set", "vary") if name in command}
-        if known:
-            driving.send(known)
+        fields = {name: command[name] for name in ("axes", "level", "offset", "set", "vary") if name in command}
+        if fields:
+            driving.send(fields)

@@ -10,7 +10,6 @@ import asyncio
 import contextlib
 import inspect
 import itertools
-import re
 import shutil
 import tempfile
 from collections.abc import AsyncIterator, Callable
@@ -22,10 +21,10 @@ from omnidyn.errors import InputError
 from omnidyn.model.presets import robot_path
 from omnidyn.progress import Report
 from omnidyn.studio.calls import LogFile, safe_name
-from omnidyn.studio.parts import COMPARE, FIT, LOGS, PROGRESS, ROBOT, TRACK
+from omnidyn.studio.parts import COMPARE, FIT, LOGS, PROGRESS, ROBOT, TRACK, WATCH
 from omnidyn.studio.removed import Removed
 from omnidyn.studio.series import META, Series
-from omnidyn.studio.words import each_text, in_page_names
+from omnidyn.studio.words import each_text, in_page_names, without_folders
 from omnidyn.studio.worker import CancelledError, EndedError, JobError, Worker
 
 MAX_FILES, MAX_FILE_BYTES, MAX_BYTES = 50, 2**30, 4 * 2**30  # of uploads
@@ -52,7 +51,7 @@ class Session:
         self.robot = ""
         self.series: dict[str, Series] = {}
         self.listeners: set[Callable[[str], None]] = set()
-        self.workers = {name: Worker() for name in ("log", "fit", "drive", TRACK, COMPARE, "warm")}
+        self.workers = {name: Worker() for name in ("log", "fit", "drive", TRACK, COMPARE, WATCH, "warm")}
         self.others = 0  # files that are neither logs nor robots
         self.made = set[str]()  # keys of logs and names of robots that were made here, not brought: no edit takes them
         self.removed: Removed | None = None
@@ -147,7 +146,7 @@ class Session:
 
     def without_paths(self, result: Any) -> Any:
         """A result of a job, its words as pages show them."""
-        return each_text(result, self.shown)
+        return each_text(result, self.shown, self.without_folders)
 
     def make_room(self, count: int, size: int) -> None:
         """Count files that lie in the folder of the session [bytes]. Raises RefusedError for too many."""
@@ -171,12 +170,12 @@ class Session:
         return self.takers.get(kind, self.add_log)
 
     def shown(self, words: str) -> str:
-        """Words as pages have them: no folders of uploads, of results, and of files that the command line named."""
-        words = re.sub(rf"{re.escape(str(self.folder))}/(?:\d+/)+", "", words)
-        for path in (*(log.path for log in self.logs.values()), *self.robots.values()):
-            for name in (path, str(Path(path).absolute())):
-                words = words.replace(name, Path(path).name)
-        return in_page_names(words)
+        """Words as pages have them, without folders."""
+        return in_page_names(self.without_folders(words))
+
+    def without_folders(self, words: str) -> str:
+        """Words without folders of uploads, of results, and of files that the command line named."""
+        return without_folders(words, self.folder, [log.path for log in self.logs.values()] + [*self.robots.values()])
 
     def remove(self, log: LogFile) -> None:
         """Take a log away; one that was uploaded is deleted when something else is removed, and can be brought back."""

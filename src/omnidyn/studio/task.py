@@ -22,8 +22,8 @@ class Task:
     files: their names in these -> paths.
 
     stopped: whether it was cancelled, or its process ended, before there was a result. cancelling: whether that was
-    asked for. running, progress, share, spent, left [s]: while it goes on. series: of its signals, by the names of
-    their folders.
+    asked for. running, progress, share, spent, left [s]: while it goes on; left: of what it does now. before: what the
+    last one like it took [s]. series: of its signals, by the names of their folders.
     """
 
     result: dict[str, Any] | None = None
@@ -35,6 +35,7 @@ class Task:
     share: float | None = None
     spent: float = 0.0
     left: float | None = None
+    before: float | None = None
     folder: Path | None = None
     series: dict[str, str] = field(default_factory=dict)
     command: str = ""

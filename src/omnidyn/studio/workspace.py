@@ -35,7 +35,7 @@ MEMBER = re.compile(r"(?:logs|maps|robots|fits)/\d{1,3}-[A-Za-z0-9._-]{1,80}", r
 END, END_BYTES, END_64, END_64_BYTES = b"PK\x05\x06", 22, b"PK\x06\x07", 20  # of an archive without a comment
 # What a manifest holds: of each entry its text, its flags and its files, those that may be absent last.
 FORM: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
-    "logs": (("name",), ("unsigned", "held_out"), ("file",), ("map",)),
+    "logs": (("name", "group"), ("unsigned", "held_out"), ("file",), ("map",)),
     "robots": (("name",), (), ("file",), ()),
     "fits": (("name", "verdict", "note"), ("failed",), ("robot", "numbers", "warnings"), ("report",)),
 }
@@ -75,16 +75,25 @@ def workspace_of(session: Session, fitting: Fitting) -> Workspace:
             raise InputError("only files can be kept in a workspace", got=got, expected="a file", remedy=remedy)
         columns = space.add("maps", log.map) if log.map else ""
         flags = {"unsigned": log.unsigned, "held_out": log.key in fitting.held_out}
-        space.logs.append({"name": log.label, **flags, "file": space.add("logs", log.path, log.label), "map": columns})
-    for name, fit in fitting.history.items():
+        space.logs.append(
+            {
+                "name": log.label,
+                "group": fitting.group_of(log.key),
+                **flags,
+                "file": space.add("logs", log.path, log.label),
+                "map": columns,
+            }
+        )
+    for name, kept in fitting.history.items():
+        fit = kept.fit
         if fit.folder is None or fit.result is None:
             continue
         files = {
-            key: space.add("fits", fit.folder / file) if (fit.folder / file).is_file() else ""
-            for key, file in FIT_FILES.items()
+            key: space.add("fits", fit.folder / file, FIT_FILES[key]) if (fit.folder / file).is_file() else ""
+            for key, file in {**FIT_FILES, "robot": kept.file}.items()
         }
         said = {key: fit.result[key] for key in ("verdict", "failed")}
-        space.fits.append({"name": name, "note": fitting.notes.get(name, ""), **said, **files})
+        space.fits.append({"name": name, "note": kept.note, **said, **files})
     for name, path in session.robots.items():
         if name not in fitting.history and Path(path).is_file():
             space.robots.append({"name": name, "file": space.add("robots", path, name)})
@@ -188,6 +197,8 @@ def _entries(value: Any, kind: str) -> list[dict[str, Any]]:
     for entry in value:
         if kind == "fits" and isinstance(entry, dict):
             entry.setdefault("note", "")  # a workspace from before there were notes
+        if kind == "logs" and isinstance(entry, dict):
+            entry.setdefault("group", "")  # and groups
         if not isinstance(entry, dict) or {key: type(item) for key, item in entry.items()} != types:
             raise _none(f"an entry of {kind} of another form", ", ".join(types))
         if not all(entry[key] for key in files):
@@ -220,7 +231,8 @@ def adopt(space: Workspace, session: Session, fitting: Fitting) -> None:
         names[entry["name"]] = name
     for entry in space.fits:
         fit = _fit(entry, space.files)
-        names[entry["name"]] = name = fitting.keep(fit, safe_name(entry["name"]))
+        (name,) = fitting.keep(fit, safe_name(entry["name"]))
+        names[entry["name"]] = name
         fitting.note(name, entry["note"])
         fitting.last = fitting.last if fitting.last.running else fit
     chosen = names.get(space.robot, space.robot)
@@ -230,6 +242,7 @@ def adopt(space: Workspace, session: Session, fitting: Fitting) -> None:
         log = session.add_log(str(space.files[entry["file"]]), safe_name(entry["name"]))
         log.map, log.unsigned = str(space.files[entry["map"]]) if entry["map"] else "", entry["unsigned"]
         held_out += [log.key] * entry["held_out"]
+        fitting.name_group(log.key, entry["group"])
     fitting.hold_out(held_out)
     session.changed_all()
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from omnidyn.document import all_of
 from omnidyn.statement import Statement
-from omnidyn.telling.sentence import Sentence, counted
+from omnidyn.telling.sentence import Sentence
+from omnidyn.telling.small_words import counted
 
 
 def _of(statement: Statement) -> str:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, TypeGuard
 
 from omnidyn.document import all_of
 from omnidyn.statement import PLACES, Statement
-from omnidyn.telling.sentence import Sentence, by_number
+from omnidyn.telling.sentence import Sentence
+from omnidyn.telling.small_words import by_number
 
 if TYPE_CHECKING:
     from omnidyn.findings.finding import Finding

@@ -98,12 +98,12 @@ def _not_moved(statement: Statement) -> str:
     if not held:
         return f"{words}; nothing drove it"
     dead = ", or its sensor is dead: not one row differs from another, so that no bound is known"
-    return f"{words}; it held {held:.4g} {'N m' if axis == 'yaw' else 'N'}{dead if numbers['dead'] else ''}"
+    return f"{words}; it held {held:.3g} {'N m' if axis == 'yaw' else 'N'}{dead if numbers['dead'] else ''}"
 
 
 def _search_end(statement: Statement) -> str:
     """A number ended where its search ends: it is no estimate."""
-    where = f"{statement.numbers['value']:.4g} {statement.numbers['unit']}".rstrip()
+    where = f"{statement.numbers['value']:.3g} {statement.numbers['unit']}".rstrip()
     return f"{statement.subject} is at the end of its search range, {where}: that is no estimate"
 
 
@@ -317,11 +317,11 @@ SENTENCES = {
     "iteration_limit": Sentence("the fit stopped after {iterations} iterations: the numbers are of its last step"),
     "not_identifiable": Sentence("{subject} is not identifiable from these logs"),
     "search_end": Sentence(_search_end),
-    "bound_of_inertia": Sentence("{subject} is at its bound {value:.4g}: nothing is seen to spin beside the body"),
+    "bound_of_inertia": Sentence("{subject} is at its bound {value:.3g}: nothing is seen to spin beside the body"),
     "bound_of_breakaway": Sentence(
-        "{subject} is at its bound {value:.4g}: the log shows no fall from it to Coulomb friction"
+        "{subject} is at its bound {value:.3g}: the log shows no fall from it to Coulomb friction"
     ),
-    "bound": Sentence("{subject} is at its bound {value:.4g}: the best fit lies beyond it"),
+    "bound": Sentence("{subject} is at its bound {value:.3g}: the best fit lies beyond it"),
     "not_white": Sentence(_not_white),
     "autocorrelated_noise": Sentence(_memory),
     "short_for_memory": Sentence(

@@ -24,7 +24,7 @@ def _coefficient_at_bound(statement: Statement) -> str:
     """A B or C would be negative and is 0."""
     numbers = statement.numbers
     return (
-        f"{statement.subject} is at bound: the best line has {numbers['free']:.4g} {unit(statement.subject)}, friction "
+        f"{statement.subject} is at bound: the best line has {numbers['free']:.3g} {unit(statement.subject)}, friction "
         f"is not negative, 0 is taken; it may be up to {numbers['high']:.3g}"
     )
 
@@ -62,15 +62,15 @@ def _breakaway_from_rest(statement: Statement) -> str:
     """A row at rest held more than Coulomb friction: breakaway is at least that."""
     key, numbers = statement.subject, statement.numbers
     return (
-        f"{key} set to {numbers['bound']:.4g} {unit(key)}: the robot stayed at rest under that force, more than the "
-        f"coulomb friction {numbers['coulomb']:.4g}; it is a lower bound, not an estimate"
+        f"{key} set to {numbers['bound']:.3g} {unit(key)}: the robot stayed at rest under that force, more than the "
+        f"coulomb friction {numbers['coulomb']:.3g}; it is a lower bound, not an estimate"
     )
 
 
 def _holds_at_least(statement: Statement) -> str:
     """What an axis held at rest."""
     bound, key = statement.numbers["bound"], statement.numbers["key"]
-    return f"axis {statement.subject} holds at least {bound:.4g} {unit(key)}"
+    return f"axis {statement.subject} holds at least {bound:.3g} {unit(key)}"
 
 
 SENTENCES = {
@@ -102,8 +102,8 @@ SENTENCES = {
     "axis_without_data": Sentence("axis {subject}: no data, B and C stay as they were"),
     "axis_never_moved": Sentence("axis {subject}: the robot never moved, B and C stay as they were"),
     "axis_at_one_speed": Sentence(
-        "axis {subject}: all rows have the same speed, {speed:.4g}: B and C are not distinguishable and stay as they "
-        "were; only their sum is known there, B speed + C = {sum:.4g}"
+        "axis {subject}: all rows have the same speed, {speed:.3g}: B and C are not distinguishable and stay as they "
+        "were; only their sum is known there, B speed + C = {sum:.3g}"
     ),
     "axis_beyond_any_robot": Sentence("axis {subject}: the fit gives {level:.3g}, beyond any robot; B and C stay"),
     "rest_as_sliding": Sentence(
@@ -111,12 +111,8 @@ SENTENCES = {
         " drive, anywhere up to breakaway, so B and C may be wrong by more than the intervals say"
     ),
     "rest_not_used": Sentence("axis {subject}: {rows} {rows:row|rows} at rest not used"),
-    "breakaway_raised": Sentence("{subject} raised from {before:.4g} to the new coulomb friction"),
-    "breakaway_kept": Sentence("{subject} stays at {level:.4g}: rows in motion do not show it"),
+    "breakaway_raised": Sentence("{subject} raised from {before:.3g} to the new coulomb friction"),
+    "breakaway_kept": Sentence("{subject} stays at {level:.3g}: rows in motion do not show it"),
     "breakaway_from_rest": Sentence(_breakaway_from_rest),
     "holds_at_least": Sentence(_holds_at_least),
-    "slow_speeds_left_out": Sentence("{count} speeds below {share:.0%} of the fastest in their row were left out"),
-    "at_current_limit": Sentence(
-        "in {rows} rows a motor is at its current limit: the force there is that of the limit, not of eq (11)"
-    ),
 }

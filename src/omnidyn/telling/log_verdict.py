@@ -11,7 +11,7 @@ from omnidyn.findings.excitation import SECTORS
 from omnidyn.findings.finding import Finding, Use, Verdict
 from omnidyn.statement import SEVERITIES
 from omnidyn.telling.findings.uses import severities, usable_for
-from omnidyn.telling.sentence import by_number, counted
+from omnidyn.telling.small_words import by_number, counted
 
 INDENT = " " * 11  # of text
 SHOWN_SPANS = 4

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from omnidyn.document import all_of
 from omnidyn.logs.columns.doubts import Doubt
 from omnidyn.statement import Statement
-from omnidyn.telling.sentence import Sentence, by_number, either
+from omnidyn.telling.sentence import Sentence, either
+from omnidyn.telling.small_words import by_number
 
 
 @dataclass(frozen=True)

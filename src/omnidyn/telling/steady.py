@@ -147,7 +147,7 @@ def _group_difference(statement: Statement) -> str:
     (first, second), (one, other) = numbers["groups"], numbers["values"]
     span = "{:+.3g} [{:.3g}, {:.3g}]".format(numbers["difference"], numbers["low"], numbers["high"])
     verdict = "differs" if numbers["differs"] else "no difference seen"
-    return f"{key.symbol}: {first} {one:.4g}, {second} {other:.4g} {key.unit}: {verdict}, {span} {key.unit} (95 %)"
+    return f"{key.symbol}: {first} {one:.3g}, {second} {other:.3g} {key.unit}: {verdict}, {span} {key.unit} (95 %)"
 
 
 def _changes_within_run(statement: Statement) -> str:
@@ -206,13 +206,13 @@ def _shapes_not_compared(statement: Statement) -> str:
 def _level_at_bound(statement: Statement) -> str:
     """A level of friction would be negative and is 0."""
     key = statement.subject
-    return f"{key} is at bound: the best fit has {statement.numbers['free']:.4g} {unit(key)}, friction is not negative"
+    return f"{key} is at bound: the best fit has {statement.numbers['free']:.3g} {unit(key)}, friction is not negative"
 
 
 def _level_kept(statement: Statement) -> str:
     """A level that the data do not show stays as in the robot file."""
     return (
-        f"{statement.subject} stays at {statement.numbers['level']:.4g} {unit(statement.subject)}, as in the robot file"
+        f"{statement.subject} stays at {statement.numbers['level']:.3g} {unit(statement.subject)}, as in the robot file"
     )
 
 

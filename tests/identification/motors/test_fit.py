@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from benchmarks.real import choose_motor as choice
+from benchmarks.real.choose_motor import WAYS, choose_motor
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.motors import choose_motor as choice
 from omnidyn.identification.motors.choice import fit_rmse, run_motor
-from omnidyn.identification.motors.choose_motor import WAYS, choose_motor
 from omnidyn.identification.motors.fit import fit_motor, fit_ways
 from omnidyn.identification.motors.input_between_rows import HOLD
 from omnidyn.identification.motors.motor_engine import step_numbers

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn import check
-from omnidyn.logs.clock.counters import widened
+from omnidyn.logs.clock.widened import widened
 from omnidyn.logs.read_log import LogOptions, recorded_log
 from tests.support.cases import case
 from tests.support.counted import bench, wandering, write_columns

@@ -5,7 +5,7 @@ import io
 import numpy as np
 import pytest
 
-from omnidyn.cli.identify_logs import STEADY_TABLE, table_kind
+from omnidyn.cli.identify_logs import STEADY_TABLE, LogFiles, table_kind
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.readers.spaced_text import NOTE, cells, is_spaced, tabbed
@@ -117,8 +117,12 @@ def test_blank_cells_between_tabs_are_never_closed_up(write):
 
 
 def test_a_steady_table_may_be_spaced(write):
-    assert table_kind([str(write("axis speed force\nx 0.3 2.4\nx -0.3 -2.4\n"))]) == STEADY_TABLE
-    assert not table_kind([str(write("t_s vx_m_s\n0 1\n"))])
+    def kind(content):
+        path = str(write(content))
+        return table_kind(LogFiles.of([path], [path]).names)
+
+    assert kind("axis speed force\nx 0.3 2.4\nx -0.3 -2.4\n") == STEADY_TABLE
+    assert not kind("t_s vx_m_s\n0 1\n")
 
 
 def test_parts():

@@ -6,7 +6,7 @@ import pytest
 from omnidyn.errors import InputError
 from omnidyn.model.correlation import KeyCorrelation
 from omnidyn.model.friction import DirectionFriction, Friction
-from omnidyn.model.known.told import correlation_of, told, with_correlation
+from omnidyn.model.known.told import correlation_of, uncertainty_of, with_correlation
 from omnidyn.model.known.uncertainty import plausible
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import PRESETS, load_robot, parse_robot, robot_to_toml
@@ -125,9 +125,9 @@ def test_another_shape_of_friction_drops_its_entries():
 
 def test_friction_that_is_off_has_no_std_either():
     robot = AXEBOT.replace(priors={"friction.axes.coulomb[0]": Prior(std=0.1), "body.mass_kg": Prior(std=0.1)})
-    assert told(robot).keys == ("friction.axes.coulomb[0]", "body.mass_kg")
+    assert uncertainty_of(robot).keys == ("friction.axes.coulomb[0]", "body.mass_kg")
     disc = robot.replace(friction=Friction(direction=DirectionFriction(coulomb=(1.8, 1.8))))
-    assert told(disc).keys == ("body.mass_kg",)
+    assert uncertainty_of(disc).keys == ("body.mass_kg",)
 
 
 def test_what_is_known_anew_takes_the_place_of_what_was():
@@ -149,8 +149,8 @@ def test_the_std_of_the_fit_is_kept_where_it_is_not_that_of_the_number():
     assert with_correlation(robot, pair, matrix, [0.1, 0.5]).correlation.std is None
     both = with_correlation(robot, pair, matrix, [0.1, 0.4])
     assert both.correlation.std == (0.1, 0.4)
-    np.testing.assert_array_equal(told(both).std, [0.1, 0.4])
-    np.testing.assert_array_equal(told(robot).std, [0.1, 0.5])
+    np.testing.assert_array_equal(uncertainty_of(both).std, [0.1, 0.4])
+    np.testing.assert_array_equal(uncertainty_of(robot).std, [0.1, 0.5])
 
 
 def test_a_list_that_is_one_number_is_drawn_as_one():

@@ -23,7 +23,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import axis_patterns, push_per_volt
 from omnidyn.model.dynamics import damping, motor_wrench
 from omnidyn.model.keys import Key
-from omnidyn.model.known.told import told
+from omnidyn.model.known.told import uncertainty_of
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import coulomb_along
@@ -65,7 +65,7 @@ class GainRow(NamedTuple):
 
 def gains(robot: Robot) -> Gains:
     """The gains of a robot, with what its file knows of them."""
-    uncertain = told(robot)
+    uncertain = uncertainty_of(robot)
     value, wheel = axis_gains(robot), wheel_gains(robot)
     if not uncertain.keys:
         return Gains(value, np.full((3, 3), np.nan), axis_patterns(robot), wheel, np.full(wheel.shape, np.nan))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.findings.filters import late_by
+from omnidyn.findings.averaged import late_by
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.clocks import sampled_with
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck

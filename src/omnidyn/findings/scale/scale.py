@@ -16,7 +16,6 @@ from omnidyn.findings.scale.mistakes import (
     current_unit,
     duty_as_voltage,
     emf_alone,
-    possible,
     unit_finding,
     unit_of,
 )
@@ -76,7 +75,7 @@ def _without_stand_in(work: LogUnderCheck) -> LogUnderCheck:
 
     Its column was exchanged with the dead one, and nothing can be said of a robot of which two wheels are not known.
     """
-    dead, expected = work.known.get("dead_wheel"), expected_wheel_speed(work, without="wheel_speed")
+    dead, expected = work.facts.get("dead_wheel"), expected_wheel_speed(work, without="wheel_speed")
     if dead is None or expected is None:
         return work
     speed = work.channels["wheel_speed"]
@@ -299,11 +298,11 @@ def _wheel_lines(work: LogUnderCheck) -> tuple[str, list[Slope], list[float]] | 
 
 def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """One wheel that differs from the others: its own radius, gear or counter."""
-    line = _wheel_lines(work) if work.known.get("dead_wheel") is None else None
-    if line is None or (work.known.get("floor_ratio") is None and line[0] != CURRENT_AND_VOLTAGE):
+    line = _wheel_lines(work) if work.facts.get("dead_wheel") is None else None
+    if line is None or (work.facts.get("floor_ratio") is None and line[0] != CURRENT_AND_VOLTAGE):
         return [], work
     source, slopes, sizes = line
-    ratio = work.known.get("floor_ratio")
+    ratio = work.facts.get("floor_ratio")
     if ratio is not None and abs(ratio.value - 1.0) > 0.1:
         return [], work  # a robot that slips does so more in one direction than in another
     coarse = [10.0 * quantum(column) for column in work.channels["wheel_speed"].T]
@@ -336,43 +335,3 @@ def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             Finding("wheel_scale", WARNING, name, {"ratio": off, "error": slopes[k].error, "source": source})
         )
     return (findings, work) if len(findings) == 1 else ([], work)
-
-
-# A gyroscope in another unit than the wheels: deg/s read as rad/s, where the wheels say how fast the robot turns
-
-SAME_UNIT_LOG = 0.5  # of the logarithm: what is off by less is in the right unit
-
-
-def check_turn_rate(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
-    """The finding on the unit of omega; the work with it put right.
-
-    The wheels are blamed (elsewhere) where they are off against the path or the motors too, or where only their unit
-    can have been mistaken.
-    """
-    speed, twist = work.full("wheel_speed"), work.get("twist")
-    wheel_motion = None if speed is None or len(work) < MIN_ROWS else wheels_twist(work, speed)
-    if wheel_motion is None or twist is None or not np.isfinite(twist[:, 2]).any():
-        return [], work
-    sizes = [float(np.sqrt(np.nanmean(values[:, 2] ** 2))) for values in (twist, wheel_motion)]
-    if not sizes[1] > 0.0 or abs(np.log(max(sizes[0], 1e-300) / sizes[1])) < SAME_UNIT_LOG:
-        return [], work
-    ids, count = work.windows()
-    yaw = slope(twist[:, 2], wheel_motion[:, 2], ids, count)
-    mistake = unit_of(yaw.value, possible(TURN_UNITS, work, "omega")) if yaw.windows >= 4 else NO_MISTAKE
-    if not any(mistake) or not yaw.differs(1.0, SAME_UNIT_LOG):
-        return [], work
-    for axes in ([0], [1]):
-        if np.isfinite(twist[:, axes]).any():
-            path = slope(twist[:, axes], wheel_motion[:, axes], ids, count)
-            if path.windows >= 4 and path.value > 0.0 and abs(np.log(path.value)) > SAME_UNIT_LOG:
-                return [], work
-    implied = electric_speed(work)
-    if implied is not None:
-        turned = slope(implied, speed, ids, count)  # type: ignore[arg-type]
-        if turned.windows >= 4 and turned.value > 0.0 and abs(np.log(turned.value)) > SAME_UNIT_LOG:
-            return [], work
-    values = twist.copy()
-    values[:, 2] /= yaw.value
-    return [unit_finding("omega", yaw.value, mistake, GEOMETRY, shown_by="ratio", source="wheels")], work.replace(
-        twist=values
-    )

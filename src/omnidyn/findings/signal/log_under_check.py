@@ -51,7 +51,7 @@ class LogUnderCheck:
 
     log: as recorded. robot: or None. rows: index into the log of each row kept, increasing in time. t [s], step: the
     usual one [s]. segments: the rows between two gaps. channels: as in Log, what is not to be trusted is NaN; commands
-    of another clock are held, measurements on the line between two of them. known: facts that families pass on, such
+    of another clock are held, measurements on the line between two of them. facts: that families pass on, such
     as "ground_ratio". merged: the samples of all clocks. sampled: components of this clock; None where there is one.
     """
 
@@ -62,7 +62,7 @@ class LogUnderCheck:
     step: float
     segments: tuple[slice, ...]
     channels: Mapping[str, FloatArray]
-    known: Mapping[str, Any] = field(default_factory=dict)
+    facts: Mapping[str, Any] = field(default_factory=dict)
     merged: Merged | None = None
     sampled: frozenset[str] | None = None
 
@@ -113,7 +113,7 @@ class LogUnderCheck:
         The speed that stands in for a dead wheel was not: it is what other channels say.
         """
         derived = channel == "wheel_speed" and self.derived_speed
-        dead = self.known.get("dead_wheel") if channel == "wheel_speed" else None
+        dead = self.facts.get("dead_wheel") if channel == "wheel_speed" else None
         return [
             (name, values)
             for name, values in self.columns(channel)
@@ -154,7 +154,7 @@ class LogUnderCheck:
 
     def knowing(self, **facts: Any) -> LogUnderCheck:
         """The log with more facts known."""
-        return replace(self, known={**self.known, **facts})
+        return replace(self, facts={**self.facts, **facts})
 
     def masked(self, channel: str, column: int, mask: BoolArray) -> LogUnderCheck:
         """The log without the values of one component where `mask` holds."""

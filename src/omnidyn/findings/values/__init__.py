@@ -1,1 +1,2 @@
-"""Single channels: values (and echoes of commands), stuck, copies (of another channel), codes (and spikes)."""
+"""Single channels: values, echoes (of commands), stuck (by wheel_predictor), copies (of another channel), codes,
+spikes."""

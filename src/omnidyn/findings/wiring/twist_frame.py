@@ -12,7 +12,7 @@ from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import WHEELS, pose_twist, wheels_twist
 from omnidyn.findings.signal.robust import smooth
-from omnidyn.findings.wiring.orders import TURNED_LIKENESS, Turned, is_turned, marker_finding, turned, with_marker
+from omnidyn.findings.wiring.turned import TURNED_LIKENESS, Turned, is_turned, marker_finding, turned, with_marker
 from omnidyn.model.frames import unwrapped
 from omnidyn.statement import ERROR, WARNING
 

@@ -5,7 +5,6 @@ returns. windows: windows in integral form and the line through them. steady_win
 or rests, and starts_and_stops: the instant at which it sets off. start: what each direction shows by itself, of rows;
 one_way_line: by a line; points: of points of steady speed. window_fit: what windows give. problem, motor_engine, fit:
 whole logs as free runs. bent_line, steady_curve: whether the steady speed is a line. held_out: which numbers a free run
-needs. choice: free runs of a fitted motor; choose_motor: the options that best predict logs left out. study:
-study_motors, all motors by one of the two methods; motor_verdict: its first line. into_robot: its numbers in a robot
-file.
+needs. choice: free runs of a fitted motor. study: study_motors, all motors by one of the two methods; motor_verdict:
+its first line. into_robot: its numbers in a robot file.
 """

@@ -8,6 +8,7 @@ from dataclasses import replace
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.needs import is_exact, why_no_inputs
 from omnidyn.identification.methods import OutputError
+from omnidyn.identification.output_error.engines.kinds import kind_with
 from omnidyn.identification.output_error.prepare import (
     Group,
     expand_keys,
@@ -20,6 +21,7 @@ from omnidyn.identification.output_error.prepare import (
 from omnidyn.identification.output_error.problem.bristles import with_damping
 from omnidyn.identification.output_error.problem.karnopp import without_band
 from omnidyn.identification.output_error.problem.parameters import refuse_unknown
+from omnidyn.identification.output_error.solve.loop import looped
 from omnidyn.identification.output_error.trust.breakaway import asked_levels, refuse_level
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
@@ -67,7 +69,8 @@ def begun(
         refuse_level(level, robot, free)
     keys = full_question.free if full_question.free is not None else guesses(robot)
     exact = exact and stays_exact(robot, [key for key in keys if key not in full_question.fixed])
-    group = make_group(name, records, robot, full_question, exact, default_keys, is_single=not joint)
+    engine = kind_with(has_loop=looped(records), exact=exact)
+    group = make_group(name, records, robot, full_question, engine, default_keys, is_single=not joint)
     _refuse_profile(group, full_question)
     return group, full_question
 

@@ -106,34 +106,33 @@ def make_group(
     records: list[Record],
     robot: Robot,
     question: OutputError,
-    exact: bool,
+    engine: Kind,
     default_keys: tuple[str, ...],
     is_single: bool,
 ) -> Group:
-    """The group of these records. exact: whether the exact engine fits them; default_keys: what is free by default.
+    """The group of these records. engine: that fits them; default_keys: what is free by default.
 
     is_single: there are no other groups, which may tell what is shared: raises InsufficientDataError where no axis
     moved.
     """
     axis_motion = motion(records, robot)
-    if looped(records):
+    if engine.has_loop:
         question = _loop_question(question, axis_motion, records, robot)
-        engine = kind_with(has_loop=True)
         return Group(name, records, robot, question, engine, default_keys, axis_motion.moving_axes, {}, ())
-    engine, bounds, warnings = kind_with(exact=exact), {}, []
+    bounds, warnings = {}, []
     free_keys = question.free if question.free is not None else (*dict.fromkeys((*default_keys, *guesses(robot))),)
     fixed = set(question.fixed)
     for axis in np.flatnonzero(~axis_motion.moving_axes).tolist():
         axis_keys = {key for key in (*free_keys, *default_keys) if Key.parse(key).axis == axis}
         fixed |= axis_keys
-        if not axis_keys or (is_single and not exact and not axis_keys & set(free_keys)):
+        if not axis_keys or (is_single and not engine.exact and not axis_keys & set(free_keys)):
             continue  # friction along the direction of travel: no axis has its own
         held_force, key = float(axis_motion.held_forces[axis]), f"friction.axes.breakaway[{axis}]"
         warnings.append(axis_motion.unfitted(axis, None if is_single else name))
         if not is_single:
             continue
         bounds |= {key: held_force} if held_force > NO_DRIVE and not axis_motion.dead[axis] else {}
-        if exact and robot.friction.axes.levels[2][axis] < held_force:
+        if engine.exact and robot.friction.axes.levels[2][axis] < held_force:
             robot = Key.parse(f"friction.axes.coulomb[{axis}]").set(robot, held_force)
     if is_single and not axis_motion.moving_axes.any():
         raise _never_moved(axis_motion, records[0].source)

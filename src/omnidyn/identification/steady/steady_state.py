@@ -53,7 +53,7 @@ def fit_steady_state(
 ) -> Estimate:
     """Identify B and C of every axis in `data`, eqs (15)-(17).
 
-    data: from `read_steady_table`, `SteadyTable(axis, speed, force)` or the functions of points.py.
+    data: from `read_steady_table`, or `SteadyTable(axis, speed, force)`.
     rest_use: what a row at rest says. "bound": friction can hold that force, so breakaway is at least that; the line is
     fitted to the moving rows. "line": it is a point of the sliding line, force = C (the paper's way). "ignore": no more
     than that it is there.

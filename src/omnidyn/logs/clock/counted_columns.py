@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.logs.clock.counters import unrolled, widened
+from omnidyn.logs.clock.counters import unrolled
 from omnidyn.logs.clock.restarts import (
     Counter,
     Restart,
@@ -17,6 +17,7 @@ from omnidyn.logs.clock.restarts import (
     overflow,
     recordings,
 )
+from omnidyn.logs.clock.widened import widened
 from omnidyn.logs.column import Column
 from omnidyn.logs.table.table import FileTable
 

@@ -1,4 +1,4 @@
-"""One file or room per format: text (a row for every value, too), parquet (with parquet_pages), lerobot, ros (bags,
+"""One file or room per format: text, listed (a row for every value), parquet (with parquet_pages), lerobot, ros (bags,
 MCAP), wpilib (wpilog), matlab; folders (a log in several files). read_table tells them by content, reader is the
 contract. Where topics have clocks of their own: recording (what a file holds, to Tables) and claims (which topic gives
 a component).

@@ -66,9 +66,6 @@ def parquet_bytes(columns: Mapping[str, FloatArray], units: Mapping[str, str]) -
     return sink.getvalue()
 
 
-# ---- reading -------------------------------------------------------------------------------------------
-
-
 def parquet_tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[FileTable]:
     """The tables of a Parquet file, its rows numbered from 1 in `Table.lines`; see the contract.
 

@@ -16,7 +16,7 @@ from omnidyn.document import Document, Part, Table, Words, all_of, plain
 from omnidyn.model.actuation import clip_voltage
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moving_axes
 from omnidyn.model.frames import AXES
-from omnidyn.model.known.told import numbers_told, told
+from omnidyn.model.known.told import numbers_told, uncertainty_of
 from omnidyn.model.known.uncertainty import DRAWS, Interval, effects, interval_of
 from omnidyn.model.robot import GUESSES, Robot
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement, as_verdict
@@ -250,7 +250,7 @@ def dead_zone(
     voltage, around = dead_zone_map(robot, directions)
     all_patterns = np.concatenate([asked_patterns, around])
     interval = None
-    if told(robot).keys:
+    if uncertainty_of(robot).keys:
         interval = interval_of(robot, partial(_volts_and_duty, patterns=all_patterns), draws, seed_of(rng))
     count, full, full_of = len(asked_patterns), *_full(robot)
     rows = [_row(robot, asked_patterns[k], float(scale[k]), full, interval, k, len(all_patterns)) for k in range(count)]

@@ -37,7 +37,7 @@ class Told:
     guessed: tuple[str, ...]
 
 
-def told(robot: Robot) -> Told:
+def uncertainty_of(robot: Robot) -> Told:
     """What the file of a robot says of how far its numbers may be off."""
     priors = {key: prior for key, prior in numbers_told(robot).items() if prior.std is not None}
     together = robot.correlation

@@ -32,7 +32,7 @@ from omnidyn.compiled.parallel import one_by_one
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.keys import Key
 from omnidyn.model.known.breakaway_levels import holding
-from omnidyn.model.known.told import SIGNED, Told, is_log, numbers_told, told
+from omnidyn.model.known.told import SIGNED, Told, is_log, numbers_told, uncertainty_of
 from omnidyn.model.robot import Robot
 
 DRAWS = 100
@@ -89,7 +89,7 @@ class Draws:
 
 def _known(robot: Robot) -> tuple[list[Key], Told]:
     """The numbers that have a std. Raises InsufficientDataError where there are none."""
-    uncertain = told(robot)
+    uncertain = uncertainty_of(robot)
     if not uncertain.keys:
         raise InsufficientDataError(
             "nothing says how far the numbers of this robot may be off",

@@ -100,7 +100,7 @@ def run(
     step: FloatArray,
     tol: float,
     late: FloatArray,
-    way: FloatArray,
+    travel: FloatArray,
     push: FloatArray | None = None,
     rates: Sequence[Mapping[str, FloatArray | None]] = (),
     order: Sequence[int] = (),
@@ -117,7 +117,7 @@ def run(
         step: to begin with [s], shape (1,); becomes the one to go on with.
         tol: of the twist [m/s].
         late: latencies [s], shape (L,).
-        way: at the start, shape (W,), of as many numbers as are wanted: see ../way.py.
+        travel: at the start, shape (W,), of as many numbers as are wanted: see ../travel.py.
         push: wrench from outside over each row [N, N, N m], shape (rows, 3).
         rates: of each of the K directions the derivatives of voltage, push and twist, where there are any.
         order: the place of each of them in what is seen.
@@ -150,11 +150,11 @@ def run(
             dforce[:, :, k] += dpush[: len(dt)]
         if start is not None:
             dtwist[:, k] = start
-    seen = empty_seen(t, late, min(SAME_TIME, SAME_SHARE * float(dt.min())), np.asarray(order, np.int64), len(way))
+    seen = empty_seen(t, late, min(SAME_TIME, SAME_SHARE * float(dt.min())), np.asarray(order, np.int64), len(travel))
     volts = np.ascontiguousarray(voltage[:, : bound.shape[1]])
     held = ForceRows(np.ascontiguousarray(dt), np.ascontiguousarray(force), dforce, volts, dvolts, bound)
     limit = _most_steps(dt, tol)
-    _refuse_run_away(run_rows(law, held, new_work(twist, way, dtwist), step, tol, limit, seen), dt, tol, limit)
+    _refuse_run_away(run_rows(law, held, new_work(twist, travel, dtwist), step, tol, limit, seen), dt, tol, limit)
     return seen
 
 
@@ -180,7 +180,7 @@ def run_looped(
     step: FloatArray,
     tol: float,
     late: FloatArray,
-    way: FloatArray,
+    travel: FloatArray,
     push: FloatArray | None = None,
     dcommand: FloatArray | None = None,
 ) -> Looped:
@@ -191,14 +191,14 @@ def run_looped(
         gains, dgains: kp, ki, limit and radius of each wheel, (4, n), and their derivatives (K, 4, n).
         loop: the commands of each interval (J, n), whether it begins with a tick, and the integral so far.
         before: what the loop has asked for until its first tick [V], shape (n,).
-        t, dt, twist, step, tol, late, way: as of `run`, of J intervals.
+        t, dt, twist, step, tol, late, travel: as of `run`, of J intervals.
         push: wrench from outside [N, N, N m], shape (3,).
         dcommand: derivatives of the commands, shape (K, J, n).
 
     Raises InputError where motion is so fast beside its duration that no patience would do.
     """
     keys, n = len(dgains), gains.shape[1]
-    seen = empty_seen(t, late, SAME_TIME, np.arange(keys), len(way))
+    seen = empty_seen(t, late, SAME_TIME, np.arange(keys), len(travel))
     law, bound = robot.law_under(robot.limit[None])
     whole = Loop(
         gains,
@@ -219,7 +219,7 @@ def run_looped(
         np.zeros((len(dt), n)),
         np.zeros((keys, len(dt), n)),
     )
-    work, limit = new_work(twist, way, np.zeros((N_AXES, keys))), _most_steps(dt, tol)
+    work, limit = new_work(twist, travel, np.zeros((N_AXES, keys))), _most_steps(dt, tol)
     dt = np.ascontiguousarray(dt)
     row = run_loop(law, dt, whole, before, np.zeros((keys, n)), work, step, tol, limit, seen)
     _refuse_run_away(row, dt, tol, limit)

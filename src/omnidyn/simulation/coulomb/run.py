@@ -78,13 +78,13 @@ def _row(seen, law, work, outside, doutside, volts, dvolts, bound, begin, dt, h,
             derive_step(law, work, dforce, length)
         end_rate(work, share)
         move_on(work, length, event)
-        known = take_samples(seen, law, work, force, dforce, now, length, share, event, knows)
-        knows = known and not event and not limited
+        known_end = take_samples(seen, law, work, force, dforce, now, length, share, event, knows)
+        knows = known_end and not event and not limited
         copy(work.x, work.ends[2])
         copy(work.rate[0], work.rate[1])
-        copy(work.way[0], work.way[1])
+        copy(work.travel[0], work.travel[1])
         copy_table(work.d, work.dends[2])
-        copy_table(work.dway[0], work.dway[1])
+        copy_table(work.dtravel[0], work.dtravel[1])
         if knows:
             copy_table(work.drate[0], work.drate[1])
         remaining = remaining - length if length < remaining else 0.0

@@ -12,7 +12,7 @@ from omnidyn.simulation.coulomb.stage import SLIDES
 
 
 class Seen(NamedTuple):
-    """What sensors show at times t - late. L latencies, K derivatives, W numbers of the way; see ../way.py.
+    """What sensors show at times t - late. L latencies, K derivatives, W numbers of the travel; see ../travel.py.
 
     NaN where t - late lies outside the run.
     """
@@ -24,9 +24,9 @@ class Seen(NamedTuple):
     order: IntArray  # (K,) the place of each derivative
     twist: FloatArray  # (L, rows, 3)
     pace: FloatArray  # (L, rows, 3) its time derivative
-    way: FloatArray  # (L, rows, W)
+    travel: FloatArray  # (L, rows, W)
     dtwist: FloatArray  # (L, rows, K, 3)
-    dway: FloatArray  # (L, rows, K, W)
+    dtravel: FloatArray  # (L, rows, K, W)
 
 
 class Law(NamedTuple):
@@ -71,21 +71,21 @@ class Work(NamedTuple):
     goals: FloatArray  # (3, 3)
     slides: FloatArray  # (4, SLIDES)
     rate: FloatArray  # (2, 3) at the start of the step and at its end
-    way: FloatArray  # (2, W) there
+    travel: FloatArray  # (2, W) there
     spare: FloatArray  # (3,)
     inverse: FloatArray  # (9,)
     d: FloatArray  # (3, K)
     dends: FloatArray  # (3, 3, K)
     dgoals: FloatArray  # (3, 3, K)
     drate: FloatArray  # (2, 3, K)
-    dway: FloatArray  # (2, W, K)
+    dtravel: FloatArray  # (2, W, K)
     dspare: FloatArray  # (3, K)
     force: FloatArray  # (3,) at work, where motors have limits
     dforce: FloatArray  # (3, K)
 
 
-def empty_seen(t: FloatArray, late: FloatArray, same: float, order: IntArray, travel: int) -> Seen:
-    """Nothing has been seen yet. travel: W."""
+def empty_seen(t: FloatArray, late: FloatArray, same: float, order: IntArray, width: int) -> Seen:
+    """Nothing has been seen yet. width: W."""
     shape = (len(late), len(t))
     return Seen(
         np.ascontiguousarray(t - t[0]),
@@ -95,29 +95,29 @@ def empty_seen(t: FloatArray, late: FloatArray, same: float, order: IntArray, tr
         order,
         np.full((*shape, 3), np.nan),
         np.full((*shape, 3), np.nan),
-        np.full((*shape, travel), np.nan),
+        np.full((*shape, width), np.nan),
         np.full((*shape, len(order), 3), np.nan),
-        np.full((*shape, len(order), travel), np.nan),
+        np.full((*shape, len(order), width), np.nan),
     )
 
 
-def new_work(start: FloatArray, way: FloatArray, dstart: FloatArray) -> Work:
-    """Room for a run from a twist (3,) and a way (W,), with derivatives of the twist (3, K)."""
-    keys, travel = dstart.shape[1], len(way)
+def new_work(start: FloatArray, travel: FloatArray, dstart: FloatArray) -> Work:
+    """Room for a run from a twist (3,) and a travel (W,), with derivatives of the twist (3, K)."""
+    keys, width = dstart.shape[1], len(travel)
     return Work(
         np.array(start, dtype=float),
         np.zeros((3, 3)),
         np.zeros((3, 3)),
         np.zeros((4, SLIDES)),
         np.zeros((2, 3)),
-        np.stack([way, np.zeros(travel)]),
+        np.stack([travel, np.zeros(width)]),
         np.zeros(3),
         np.zeros(9),
         np.array(dstart, dtype=float),
         np.zeros((3, 3, keys)),
         np.zeros((3, 3, keys)),
         np.zeros((2, 3, keys)),
-        np.zeros((2, travel, keys)),
+        np.zeros((2, width, keys)),
         np.zeros((3, keys)),
         np.zeros(3),
         np.zeros((3, keys)),

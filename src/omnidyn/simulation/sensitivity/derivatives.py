@@ -232,11 +232,11 @@ def _differentiate_coulomb(
         seen, rows = run_of_loop.seen, keep[:-1]
         volts, dvolts = passed_on(run_of_loop.ask, run_of_loop.dask, robot.drive.dead_band)
         voltage, dvolts = volts[rows], dvolts[:, rows]
-    twists, poses = seen.twist[0], seen.way[0][:, [PATH, PATH + 1, 0]]
+    twists, poses = seen.twist[0], seen.travel[0][:, [PATH, PATH + 1, 0]]
     twists[0], poses[0] = twist, pose
     motion = Motion(None, twists, poses, voltage)
     run = as_run(robot, held_commands, held_commands, motion, named(Coulomb.kind, tol), ())
-    dtwist, dpose = seen.dtwist[0], seen.dway[0][..., [PATH, PATH + 1, 0]]
+    dtwist, dpose = seen.dtwist[0], seen.dtravel[0][..., [PATH, PATH + 1, 0]]
     parts = (dtwist, dpose, _flowing(_settled(ready.robots, run, dtwist, dvolts), bound))
     return Derivatives(run, ready.keys, *(np.moveaxis(part, 1, 2) / ready.scale for part in parts))
 

@@ -44,7 +44,7 @@ from omnidyn.simulation.speed_loop import loop_of
 from omnidyn.simulation.travel import PATH, SAME_TIME, TURN
 
 PIECES, ROUGH_TOLERANCE = 16, 1e-3  # steps in a row, at most; [m/s] the tolerance where they were more
-PATH_AND_TURN = [1, 2, 0]  # of the way, in the order of a twist
+PATH_AND_TURN = [1, 2, 0]  # of the travel, in the order of a twist
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ class VoltageProgram(NamedTuple):
 class LateSample:
     """What a channel with one latency, `late` [s], shows at the rows of a log; NaN where that lies outside the run.
 
-    twist (rows, 3), pace: its time derivative, way (rows, W) since the start, voltage (rows, n) in force, current
+    twist (rows, 3), pace: its time derivative, travel (rows, W) since the start, voltage (rows, n) in force, current
     (rows, n) of dynamic electrics, else None. d...: derivatives, (rows, K, 3), (rows, K, W), (rows, K, n).
     """
 
@@ -93,10 +93,10 @@ class LateSample:
     late: float
     twist: FloatArray
     pace: FloatArray
-    way: FloatArray
+    travel: FloatArray
     voltage: FloatArray
     dtwist: FloatArray
-    dway: FloatArray
+    dtravel: FloatArray
     dvoltage: FloatArray
     current: FloatArray | None
     current_pace: FloatArray | None
@@ -104,7 +104,7 @@ class LateSample:
 
     def heading(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(heading since the start [rad], its time derivative, derivatives). Shapes (rows, 1), same, (rows, K, 1)."""
-        return self.way[:, :TURN], self.twist[:, 2:], self.dway[..., :TURN]
+        return self.travel[:, :TURN], self.twist[:, 2:], self.dtravel[..., :TURN]
 
     def wheel_speeds(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(wheel speeds [rad/s], their time derivative, their derivatives). Shapes (rows, n), same, (rows, K, n)."""
@@ -113,7 +113,7 @@ class LateSample:
 
     def wheel_angles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(angles that the wheels have turned by [rad], ...), as above: of the path what speeds are of the twist."""
-        value, by = self._at_wheels(self.way[:, PATH_AND_TURN], self.dway[..., PATH_AND_TURN])
+        value, by = self._at_wheels(self.travel[:, PATH_AND_TURN], self.dtravel[..., PATH_AND_TURN])
         return value, wheel_speed(self.robot.wheels, self.twist), by
 
     def _at_wheels(self, motion: FloatArray, by: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -132,8 +132,8 @@ class LateSample:
         Shapes (rows, 2), same, (rows, K, 2).
         """
         turn = body_to_world(facing)[:2, :2].T
-        pace = np.einsum("kij,kj->ki", body_to_world(facing + self.way[:, 0])[:, :2, :2], self.twist[:, :2])
-        return self.way[:, PATH:] @ turn, pace, self.dway[..., PATH:] @ turn
+        pace = np.einsum("kij,kj->ki", body_to_world(facing + self.travel[:, 0])[:, :2, :2], self.twist[:, :2])
+        return self.travel[:, PATH:] @ turn, pace, self.dtravel[..., PATH:] @ turn
 
     def currents(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(currents [A], their time derivative under held voltages, their derivatives), shapes as above."""
@@ -163,7 +163,7 @@ def late_samples(
     """Simulate under held voltages and sample the run at t - late, one LateSample for every latency.
 
     tol as for `simulate`, but ROUGH_TOLERANCE instead of None where friction falls so fast that a row took more than
-    PIECES steps; travel: what is wanted of the way, see sample.py. Also returns the number of rows in which the
+    PIECES steps; travel: what is wanted of it, see sample.py. Also returns the number of rows in which the
     friction solver hit its cap. Raises InputError for a direction that changes friction or a gear loss which is off.
     """
     (numbers, plants), (t, voltage, start, _) = _plants(robot, directions), program
@@ -229,7 +229,7 @@ def _coulomb_samples(
         for k, direction in enumerate(directions):
             if direction.voltage is not None:
                 dvoltage[:, k] = direction.voltage[at]
-        motion = (seen.twist[c], seen.pace[c], seen.way[c], voltage[at], seen.dtwist[c], seen.dway[c], dvoltage)
+        motion = (seen.twist[c], seen.pace[c], seen.travel[c], voltage[at], seen.dtwist[c], seen.dtravel[c], dvoltage)
         looks.append(LateSample(robot, tuple(directions), float(delay), *motion, None, None, None))
     return looks
 
@@ -268,10 +268,10 @@ def _coulomb_looped(
     begins, voltage, rates = _in_force(volts, dvolts, np.concatenate([[0.0], np.cumsum(dt)]))
     for c, delay in enumerate(seen.late):
         rests = seen.t - delay < -SAME_TIME
-        for array in (seen.twist, seen.pace, seen.way, seen.dtwist, seen.dway):
+        for array in (seen.twist, seen.pace, seen.travel, seen.dtwist, seen.dtravel):
             array[c, rests] = 0.0
         at = np.clip(np.searchsorted(begins, seen.t - delay + SAME_TIME, side="right") - 1, 0, len(voltage) - 1)
-        motion = (seen.twist[c], seen.pace[c], seen.way[c], voltage[at], seen.dtwist[c], seen.dway[c])
+        motion = (seen.twist[c], seen.pace[c], seen.travel[c], voltage[at], seen.dtwist[c], seen.dtravel[c])
         looks.append(
             LateSample(
                 robot, tuple(directions), float(delay), *motion, np.moveaxis(rates[:, at], 0, 1), None, None, None
@@ -329,7 +329,7 @@ def looped_samples(
     )
     for c, delay in enumerate(samples.late):
         rests = samples.t - delay < -SAME_TIME
-        for part in (samples.state, samples.pace, samples.way, samples.dstate, samples.dway):
+        for part in (samples.state, samples.pace, samples.travel, samples.dstate, samples.dtravel):
             part[c, rests] = 0.0
     return _looks(
         robot,
@@ -429,10 +429,10 @@ def _looks(
                 float(delay),
                 twist,
                 pace,
-                samples.way[c],
+                samples.travel[c],
                 voltage[at],
                 dtwist,
-                samples.dway[c],
+                samples.dtravel[c],
                 np.moveaxis(rates[:, at], 0, 1),
                 *_currents(samples, c),
             )

@@ -6,9 +6,9 @@ weights are the continuous extension of SDIRK2 itself, with b2 = (th^2/2 - gamma
 half steps, the parabola through the three. Both leave h^3, as the step does. See Hairer, Norsett, Wanner, Solving
 Ordinary Differential Equations I, II.6.
 
-Beside the state goes the way since the start, see ../way.py. Heading and path are linear in the velocities: their
+Beside the state goes the travel since the start, see ../travel.py. Heading and path are linear in the velocities: their
 integral over a part of a step is that of the weights. The place takes three nodes of Simpson's rule. A fit asks for no
-more of the way than it needs: TURN, PATH or PLACE.
+more of the travel than it needs: TURN, PATH or PLACE.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from omnidyn.simulation.travel import PATH, PLACE, SAME_TIME, TURN
 class Samples(NamedTuple):
     """Rows of a log, each seen late: what it shows at t - late. L latencies, K derivatives, S = 3 or 3 + n numbers.
 
-    W numbers of the way: TURN, PATH or PLACE. NaN where t - late lies outside the run.
+    W numbers of the travel: TURN, PATH or PLACE. NaN where t - late lies outside the run.
     """
 
     t: FloatArray  # (rows,) [s], from the start of the run
@@ -38,10 +38,10 @@ class Samples(NamedTuple):
     next: IntArray  # (L,) the row whose sample is next
     state: FloatArray  # (L, rows, S) x, and currents
     pace: FloatArray  # (L, rows, S) its time derivative
-    way: FloatArray  # (L, rows, W)
+    travel: FloatArray  # (L, rows, W)
     dstate: FloatArray  # (L, rows, K, S)
-    dway: FloatArray  # (L, rows, K, W)
-    gone: FloatArray  # (W,) the way so far
+    dtravel: FloatArray  # (L, rows, K, W)
+    gone: FloatArray  # (W,) the travel so far
     dgone: FloatArray  # (K, W)
 
 
@@ -109,27 +109,27 @@ def _stretch(along, k):
 
 
 @part
-def go_on(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share):
-    """Move the way and its derivatives on over a share of a step of length h, in place.
+def go_on(travel, dtravel, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share):
+    """Move the travel and its derivatives on over a share of a step of length h, in place.
 
     node, dnode: where in the step xm and dm are, GAMMA or 1/2.
     """
-    if len(way) == PLACE:
-        _go_places(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share)
+    if len(travel) == PLACE:
+        _go_places(travel, dtravel, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share)
     length, area, darea = along.plants.body[-1].length, _areas(share, node), _areas(share, dnode)
     turn = h / length * _mixed(area, x0[2], xm[2], x1[2])
-    way[0] += turn
-    for k in range(len(dway)):
-        dway[k, 0] += (h * _mixed(darea, d0[k, 2], dm[k, 2], d1[k, 2]) - turn * _stretch(along, k)) / length
-    if len(way) > TURN:
+    travel[0] += turn
+    for k in range(len(dtravel)):
+        dtravel[k, 0] += (h * _mixed(darea, d0[k, 2], dm[k, 2], d1[k, 2]) - turn * _stretch(along, k)) / length
+    if len(travel) > TURN:
         for a in range(2):
-            way[1 + a] += h * _mixed(area, x0[a], xm[a], x1[a])
-            for k in range(len(dway)):
-                dway[k, 1 + a] += h * _mixed(darea, d0[k, a], dm[k, a], d1[k, a])
+            travel[1 + a] += h * _mixed(area, x0[a], xm[a], x1[a])
+            for k in range(len(dtravel)):
+                dtravel[k, 1 + a] += h * _mixed(darea, d0[k, a], dm[k, a], d1[k, a])
 
 
 @part
-def _go_places(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share):
+def _go_places(travel, dtravel, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share):
     """Move the place, and its derivatives, on; the heading is still that at the start of the step."""
     length = along.plants.body[-1].length
     for point in range(3):
@@ -137,17 +137,17 @@ def _go_places(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share):
         rule = h * share * (4.0 if point == 1 else 1.0) / 6.0
         weight, dweight, area, darea = _weights(at, node), _weights(at, dnode), _areas(at, node), _areas(at, dnode)
         turn = h / length * _mixed(area, x0[2], xm[2], x1[2])
-        cos, sin = rule * math.cos(way[0] + turn), rule * math.sin(way[0] + turn)
+        cos, sin = rule * math.cos(travel[0] + turn), rule * math.sin(travel[0] + turn)
         vx, vy = _mixed(weight, x0[0], xm[0], x1[0]), _mixed(weight, x0[1], xm[1], x1[1])
         east, north = cos * vx - sin * vy, sin * vx + cos * vy
-        way[PATH] += east
-        way[PATH + 1] += north
-        for k in range(len(dway)):
+        travel[PATH] += east
+        travel[PATH + 1] += north
+        for k in range(len(dtravel)):
             swing = h * _mixed(darea, d0[k, 2], dm[k, 2], d1[k, 2]) - turn * _stretch(along, k)
-            angle = dway[k, 0] + swing / length
+            angle = dtravel[k, 0] + swing / length
             ux, uy = _mixed(dweight, d0[k, 0], dm[k, 0], d1[k, 0]), _mixed(dweight, d0[k, 1], dm[k, 1], d1[k, 1])
-            dway[k, PATH] += cos * ux - sin * uy - angle * north
-            dway[k, PATH + 1] += sin * ux + cos * uy + angle * east
+            dtravel[k, PATH] += cos * ux - sin * uy - angle * north
+            dtravel[k, PATH + 1] += sin * ux + cos * uy + angle * east
 
 
 @part
@@ -177,7 +177,7 @@ def take_samples(samples, along, begin, h, start, middle, end, node, d0, dm, d1,
                 samples.pace[c, r, a] = _mixed(rate, v0, vm, v1) / h
                 for k in range(len(d0)):
                     samples.dstate[c, r, k, a] = _mixed(dweight, d0[k, a], dm[k, a], d1[k, a])
-            copy_row(samples.way[c, r], samples.gone)
-            copy_table(samples.dway[c, r], samples.dgone)
-            go_on(samples.way[c, r], samples.dway[c, r], along, x0, xm, x1, node, d0, dm, d1, dnode, h, share)
+            copy_row(samples.travel[c, r], samples.gone)
+            copy_table(samples.dtravel[c, r], samples.dgone)
+            go_on(samples.travel[c, r], samples.dtravel[c, r], along, x0, xm, x1, node, d0, dm, d1, dnode, h, share)
     go_on(samples.gone, samples.dgone, along, x0, xm, x1, node, d0, dm, d1, dnode, h, 1.0)

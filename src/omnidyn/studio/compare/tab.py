@@ -144,7 +144,7 @@ class CompareTab:
         if task.result is None:
             return
         verdict(task.result["severity"], task.result["verdict"], "drift-verdict")
-        with ui.element("div").classes("scroll"):
+        with ui.element("div").classes("scroll").props("tabindex=0 role=region aria-label='picture of the drift'"):
             picture = ui.element("img").classes("picture")
             picture._props["src"] = f"/drift/{PICTURE}?of={task.folder.parent.name if task.folder else ''}"
             picture._props["alt"] = task.result["verdict"]

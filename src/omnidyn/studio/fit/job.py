@@ -14,9 +14,9 @@ from omnidyn.comparison.traces import unit as unit_of
 from omnidyn.document import Table, interval_cell
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.estimate import NOT_DETERMINED, Estimate
-from omnidyn.identification.fit_document import number_table
+from omnidyn.identification.fit_document import difference_table, number_table
 from omnidyn.identification.identification import Identification
-from omnidyn.identification.methods import OutputError, SteadyState
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.prepare import free_by_default, guesses
 from omnidyn.model.keys import EMF, ROTOR, TORQUE, Key, find_key, in_words, unit
@@ -24,11 +24,12 @@ from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
 from omnidyn.statement import ERROR, SEVERITIES, Statement
 from omnidyn.studio.job import Tell, read, robot_of, timed, write_free_runs
-from omnidyn.studio.parts import FITTED, HELD_OUT
+from omnidyn.studio.parts import FITTED, HELD_OUT, ROBOT_FILE
 from omnidyn.studio.words import number_in_words
 
 IDLE = 19  # of a process that waits for all others
 LOADED, COMPILED = 2, 8  # of the first runs: a simulation and a fit; those of the exact engine, seconds each
+PARTS = ("reading", "checking", "fitting", "diagnosing", "replaying", "drawing")  # how their phases begin
 CHOICES = (  # what a page offers beside what is free by default; any key can be named on the command line
     "body.mass_kg",
     "body.inertia_kg_m2",
@@ -46,9 +47,9 @@ def fit(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]
     """What `omnidyn identify` says of logs: verdict, numbers, advice; writes robot, report, table and series.
 
     request: "robot", "logs" (path, name, map, unsigned each), "hold_out" (names), "free" (keys, or none for the
-    default), "folder" of the results.
+    default), "groups" (of each log, or none), "folder" of the results.
     """
-    with timed(tell) as listen:
+    with timed(tell, PARTS) as listen:
         return _fitted(request, listen)
 
 
@@ -63,16 +64,20 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
         robot,
         OutputError(free=free) if free else None,
         hold_out=[glob.escape(name) for name in request["hold_out"]],
+        groups=request.get("groups") or None,
         progress=listen,
         check=logs,
         keep_best=True,
     )
-    estimate = result.estimate
-    omnidyn.save_robot(estimate.robot, folder / "robot.toml")
+    estimates = result.groups if len(result.groups) > 1 else {"": result.estimate}
+    robots = {group: f"robot-{k}.toml" if group else ROBOT_FILE for k, group in enumerate(estimates, 1)}
+    for group, file in robots.items():
+        omnidyn.save_robot(estimates[group].robot, folder / file)
     _ = result.after  # what follows a fit is made here, where its progress is heard
     listen(Report("drawing"))
-    table = _with_before(_numbers(estimate), robot)
-    warnings = [{"severity": w.severity, "text": str(w)} for w in dict.fromkeys(estimate.warnings)]
+    table = _with_before(_numbers(estimates), robot)
+    said = dict.fromkeys(warning for estimate in estimates.values() for warning in estimate.warnings)
+    warnings = [{"severity": warning.severity, "text": str(warning)} for warning in said]
     (folder / "numbers.csv").write_text(_csv(table), "utf-8")
     (folder / "warnings.csv").write_text(
         _csv(Table(("severity", "text"), [(*warning.values(),) for warning in warnings])), "utf-8"
@@ -83,13 +88,22 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
         "severity": ERROR if result.failures else gravest(result.outcome()),
         "interrupted": result.interrupted,
         "numbers": {"head": list(table.head), "rows": [list(row) for row in table.rows]},
-        "values": {name: float(value) for name, value in estimate.value.items()},
+        "robots": robots,
+        "values": {
+            group: {name: float(value) for name, value in estimate.value.items()}
+            for group, estimate in estimates.items()
+        },
+        "differences": _differences(result),
         "warnings": warnings,
         "advice": [str(step) for step in result.advice],
         "remedies": _remedies(result),
         **_free_runs(result, folder),
     }
-    shown["report"] = _write_report(result, request, folder / "report.html")
+    from omnidyn.report.identification_page import render_identification  # imported lazily: slow to load
+
+    page = render_identification(result, {**result.provenance, "command": request["command"]})
+    (folder / "report.html").write_text(page, "utf-8")
+    shown["report"] = True
     return shown
 
 
@@ -98,7 +112,22 @@ def gravest(statements: Sequence[Statement]) -> str:
     return min((statement.severity for statement in statements), key=SEVERITIES.index)
 
 
-def _numbers(estimate: Estimate) -> Table:
+def _numbers(estimates: Mapping[str, Estimate]) -> Table:
+    """Every number with its interval, and behind it its group where there are several."""
+    tables = {group: _numbers_of(estimate) for group, estimate in estimates.items()}
+    rows = [
+        (f"{row[0]} ({group})" if group else row[0], *row[1:]) for group, table in tables.items() for row in table.rows
+    ]
+    return replace(next(iter(tables.values())), rows=rows)
+
+
+def _differences(result: Identification) -> dict[str, Any]:
+    """What differs between groups, and what may: a table, empty where there are no groups."""
+    table = difference_table(result.differences)
+    return {"head": ["number", *table.head[1:-1]], "rows": [[row[-1], *row[1:-1]] for row in table.rows]}
+
+
+def _numbers_of(estimate: Estimate) -> Table:
     """Every number with its interval."""
     if isinstance(estimate, OutputErrorEstimate):
         table = number_table(estimate)
@@ -145,14 +174,9 @@ def _csv(table: Table) -> str:
 
 def _remedies(result: Identification) -> list[dict[str, str]]:
     """What may be missing in the model and can be fitted: key, and words."""
-    fits = list(result.fits.values())
-    if not fits or fits[0].lack_of_fit is None:
-        return []
-    return [
-        {"key": remedy.key, "text": str(remedy.cause)}
-        for remedy in fits[0].lack_of_fit.causes
-        if remedy.offered and find_key(remedy.key) is not None
-    ]
+    causes = [cause for fit in result.fits.values() if fit.lack_of_fit for cause in fit.lack_of_fit.causes]
+    offered = {cause.key: str(cause.cause) for cause in reversed(causes) if cause.offered and find_key(cause.key)}
+    return [{"key": key, "text": text} for key, text in reversed(offered.items())]
 
 
 def _free_runs(result: Identification, folder: Path) -> dict[str, Any]:
@@ -160,13 +184,11 @@ def _free_runs(result: Identification, folder: Path) -> dict[str, Any]:
 
     "logs": a table of their errors. "series": folders. "runs": what a page calls a log -> its free run, its residuals.
     """
-    validation = result.validation if isinstance(result.method, OutputError) else None
-    if validation is None:
-        return {"series": [], "runs": {}, "logs": {"head": [], "rows": []}}
     rows, runs, channels = [], {}, dict[str, None]()
-    for use, comparison in ((HELD_OUT, validation.held_out), (FITTED, validation.fitted)):
-        for k, run in enumerate(comparison.measured if comparison is not None else ()):
-            assert comparison is not None
+    of_uses = {HELD_OUT: [one.held_out for one in result.validations.values()]}
+    of_uses[FITTED] = [one.fitted for one in result.validations.values()]
+    for use, comparison in ((use, one) for use, all_of_use in of_uses.items() for one in all_of_use if one is not None):
+        for k, run in enumerate(comparison.measured):
             errors, title = comparison.rmse_of_log(k), f"{run.source} ({use})"
             rows.append((run.source, use, errors))
             channels |= dict.fromkeys(errors)
@@ -178,26 +200,9 @@ def _free_runs(result: Identification, folder: Path) -> dict[str, Any]:
     table = [
         [log, use, *(f"{errors[name]:.3g}" if name in errors else "" for name in channels)] for log, use, errors in rows
     ]
+    head *= bool(table)
     names = [name for pair in runs.values() for name in pair]
     return {"series": names, "runs": runs, "logs": {"head": head, "rows": table}}
-
-
-def _write_report(result: Identification, request: Mapping[str, Any], path: Path) -> bool:
-    """The page that `--report` writes; whether there is one."""
-    record = {"omnidyn": omnidyn.__version__, "command": request["command"], "inputs": []}
-    if isinstance(result.method, SteadyState) and result.study is not None:
-        from omnidyn.report.steady_page import render_study
-
-        study: Any = result.study
-        page = render_study(study, record, verdict=result.verdict, verdicts=result.verdicts)
-    elif isinstance(result.method, OutputError):
-        from omnidyn.report.fit_page import render_fit
-
-        page = render_fit(result, record)
-    else:
-        return False
-    path.write_text(page, "utf-8")
-    return True
 
 
 def free_keys(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from typing import Any
+from urllib.parse import quote
 
 from nicegui import ui
 
 from omnidyn.document import in_clauses
+from omnidyn.model.keys import in_words
 from omnidyn.studio.calls import LogFile
 from omnidyn.studio.elements import table, verdict
-from omnidyn.studio.fit.state import MAX_NOTE, Fitting
+from omnidyn.studio.fit.state import MAX_GROUP, MAX_NOTE, Fitting, Kept
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import FIT, FITTED, FREE, HELD_OUT, LEFT_OUT, LOGS, ROBOT
 from omnidyn.studio.session import ROBOT_SUFFIX
@@ -20,9 +22,12 @@ from omnidyn.studio.task import Task
 WHY = {
     "no_log": "Add a log first: tab Log.",
     "no_robot": "Choose a robot first.",
-    "checking": "The log is being checked.",
+    "checking": "{} is being checked.",
     "nothing_free": "Nothing is free: choose what to fit.",
     "all_held_out": "No log is fitted: choose one to fit.",
+    "no_group": "{} has no group: name one for each log, or for none.",
+    "one_group": "The logs that are fitted are all of one group: name another one, or none.",
+    "group_held_out": "A group has only logs that are held out: choose one to fit, or name another group.",
 }
 
 
@@ -36,7 +41,8 @@ class FitTab:
         """Lay it out."""
         self.page.empty("Fit")
         self.page.part(self.page.robot_choice, ROBOT, of=self.page.robots)
-        self.page.part(self._uses, LOGS, of=self._usable)
+        self.page.part(self._uses, LOGS, of=self._labels)  # a check that ends takes no click and no text away
+        self.page.part(self._unusable, LOGS, FIT, of=self._not_usable)
         self.page.part(self._remedies, LOGS, FIT, of=self._wrong)
         self.page.part(self._free, FREE, ROBOT)
         self.page.part(self._start, FIT, LOGS, of=self._ready)
@@ -49,26 +55,46 @@ class FitTab:
         if len(self.session.logs) < 2:
             return
         with ui.element("div").classes("robots"):
-            for key, log in self.session.logs.items():
+            for key, label in self._labels().items():
                 with ui.row().classes("line entry"):
-                    ui.label(log.label).classes("use")
+                    ui.label(label).classes("use")
                     use = ui.toggle(
                         [FITTED, HELD_OUT, LEFT_OUT], value=self.fitting.use_of(key), on_change=self._use(key)
                     )
-                    use.props(f"no-caps dense unelevated aria-label='use of {log.label}'")
+                    use.props(f"no-caps dense unelevated aria-label='use of {label}'")
                     self.page.mirror(use, FIT, partial(self.fitting.use_of, key), key)
-                    if not self._usable()[key][1]:
-                        ui.label("not usable as it is: leave it out, or mend it on the tab Log").classes("error-text")
-        ui.label("What is held out is predicted, not fitted: that shows what the model is worth.").classes("quiet")
+                    group = ui.input(value=self.fitting.group_of(key), placeholder="group, such as carpet")
+                    group.props(f"dense maxlength={MAX_GROUP} aria-label='group of {label}'").classes("group")
+                    group.on("change", self._name_group(key, group))
+                    self.page.mirror(group, FIT, partial(self.fitting.group_of, key), f"group of {key}")
+        ui.label(
+            "What is held out is predicted, not fitted: that shows what the model is worth. "
+            "Logs of several floors or loads: name a group for each log, and each group gets friction of its own."
+        ).classes("text quiet")
 
-    def _usable(self) -> dict[str, tuple[str, bool]]:
-        """Key of each log -> its label, and whether it can be used as it is."""
-        logs = self.session.logs.items()
-        return {key: (log.label, not log.error and not (log.result and log.result["has_errors"])) for key, log in logs}
+    def _labels(self) -> dict[str, str]:
+        """Key of each log -> its label."""
+        return {key: log.label for key, log in self.session.logs.items()}
+
+    def _not_usable(self) -> list[str]:
+        """Labels of logs that cannot be used as they are, and that no button mends."""
+        mended = [log for log, _ in self._wrong()]
+        bad = [log for log in self.session.logs.values() if log.error or (log.result and log.result["has_errors"])]
+        return [log.label for log in bad if log not in mended]
+
+    def _unusable(self) -> None:
+        """Which logs cannot be used as they are, and what to do."""
+        if len(self.session.logs) > 1 and (labels := self._not_usable()):
+            words = f"Not usable: {', '.join(labels)}. Leave it out, or mend it on the tab Log."
+            ui.label(words).classes("text error-text")
 
     def _use(self, key: str) -> Callable[[Any], None]:
         """What takes the use of a log."""
         return lambda event: self.fitting.use(key, event.value)
+
+    def _name_group(self, key: str, group: ui.input) -> Callable[[], None]:
+        """What takes the group of a log."""
+        return lambda: self.fitting.name_group(key, str(group.value or ""))
 
     def _remedies(self) -> None:
         """What is wrong with a log and can be mended by reading it another way, each with a button."""
@@ -104,7 +130,9 @@ class FitTab:
             )
             button.set_enabled(not code and not running)
             if code:
-                ui.label(words if code in ("unfit", "unread") else WHY[code]).classes("text quiet").props("id=why")
+                ui.label(words if code in ("unfit", "unread") else WHY[code].format(words)).classes("text quiet").props(
+                    "id=why"
+                )
             elif not running:
                 ui.label(fitted).classes("text quiet")
 
@@ -132,16 +160,20 @@ class FitTab:
         result = fit.result
         verdict(result["severity"], result["verdict"], "fit-verdict")
         with ui.row().classes("line"):
-            ui.link("Robot file", "/fit/robot.toml").props("download")
+            for name in self.fitting.names_of(fit):
+                ui.link(f"Robot file {name}", f"/robot/{quote(name)}").props("download").classes("robot-file")
             ui.link("Numbers (CSV)", "/fit/numbers.csv").props("download")
             if result["report"]:
                 ui.link("Report", "/fit/report.html", new_tab=True)
         table(result["numbers"], "numbers")
+        if result.get("differences", {}).get("rows"):
+            ui.label("Between the groups").classes("title")
+            table(result["differences"], "differences")
         for remedy in result["remedies"]:
             with ui.row().classes("line"):
                 ui.label(remedy["text"]).classes("text")
                 ui.button(
-                    f"Add {remedy['key']} and refit",
+                    f"Add {in_words(remedy['key'])} and refit",
                     on_click=self._refit(remedy["key"]),
                 ).props("outline dense no-caps")
         for words in result["advice"]:
@@ -173,9 +205,9 @@ class FitTab:
             )
         picture = self.page.plot(fit.series[runs[at["log"]][0]], [], "free-run.png")
 
-    def _kept(self) -> tuple[list[str], str]:
-        """The fits of the history, and the one that is shown."""
-        return list(self.fitting.history), self.fitting.name_of(self.fitting.last)
+    def _kept(self) -> tuple[list[str], list[str]]:
+        """The fits of the history, and those that are shown."""
+        return list(self.fitting.history), self.fitting.names_of(self.fitting.last)
 
     def _history(self) -> None:
         """All fits of the session, to be looked at again, named, noted, removed."""
@@ -184,14 +216,15 @@ class FitTab:
             return
         with self.page.box(f"History ({len(fitting.history)})"):
             with ui.element("div").classes("robots"):
-                for name, fit in reversed(fitting.history.items()):
-                    self._fit_entry(name, fit)
+                for name, kept in reversed(fitting.history.items()):
+                    self._fit_entry(name, kept)
             with ui.row().classes("line"):
                 ui.link("Save the work as a Python script", "/script").props("download")
                 ui.label("It makes the same numbers from the same logs.").classes("text quiet")
 
-    def _fit_entry(self, name: str, fit: Task) -> None:
+    def _fit_entry(self, name: str, kept: Kept) -> None:
         """A fit of the history."""
+        fit = kept.fit
         fitting, stem = self.fitting, name.removesuffix(ROBOT_SUFFIX)
         trouble = ui.label().classes("text error-text")
         with ui.row().classes("line entry"):
@@ -202,7 +235,7 @@ class FitTab:
                     trouble.text = fitting.rename(name, str(named.value))
 
             named.on("change", rename)
-            note = ui.input(placeholder="note", value=fitting.notes.get(name, "")).classes("wide")
+            note = ui.input(placeholder="note", value=kept.note).classes("wide")
             note.props(f"dense maxlength={MAX_NOTE} aria-label='note to {stem}'")
             note.on("change", lambda: fitting.note(name, str(note.value or "")))
             shown = fit is fitting.last

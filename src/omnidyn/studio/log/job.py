@@ -12,7 +12,7 @@ import numpy as np
 import omnidyn
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.comparison.traces import unit as unit_of
-from omnidyn.document import plain
+from omnidyn.document import plain, sentence
 from omnidyn.files import default_max_bytes, too_large
 from omnidyn.findings.check import check_blocks, check_log
 from omnidyn.findings.finding import Finding, Verdict
@@ -160,7 +160,8 @@ def align(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, An
     first, second = (read(log, robot).to_run() for log in request["logs"])
     alignment = omnidyn.align(first, second)
     verdict = alignment.verdict
-    said = " ".join(filter(None, (alignment.document().verdict_text, verdict.remedy_text)))
+    remedy = verdict.remedy_text and sentence(verdict.remedy_text)
+    said = " ".join(filter(None, (alignment.document().verdict_text, remedy)))
     return {"offset": alignment.offset, "severity": verdict.severity, "verdict": said}
 
 

@@ -10,6 +10,8 @@ from nicegui import ui
 from omnidyn.studio import calls
 from omnidyn.studio.calls import LogFile
 from omnidyn.studio.elements import MARK, UNUSED, column_row, verdict
+from omnidyn.studio.live.state import Watching
+from omnidyn.studio.live.strip import Strip
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import LOGS, PROGRESS, ROBOT
 
@@ -17,8 +19,9 @@ from omnidyn.studio.parts import LOGS, PROGRESS, ROBOT
 class LogTab:
     """The tab of one page."""
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: Page, watching: Watching) -> None:
         self.page, self.session, self.shown = page, page.session, ""
+        self.strip = Strip(page, watching, self._log)
 
     def build(self) -> None:
         """Lay it out."""
@@ -32,6 +35,7 @@ class LogTab:
         self.page.part(self._choice, LOGS, of=self._choices)
         self.page.part(self._progress, LOGS, PROGRESS)
         self.page.next_step("Log")
+        self.strip.build()
         self.page.part(self._content, LOGS)
 
     def _log(self) -> LogFile | None:
@@ -148,7 +152,9 @@ class LogTab:
         with ui.element("div").classes(f"finding {finding['severity']}").props(f"id=finding-{k}"):
             with ui.row().classes("line"):
                 ui.label(MARK[finding["severity"]]).classes("mark")
-                ui.label(f"{finding['severity']}: {finding['code']} {finding['subject']}").classes("code")
+                ui.label(f"{finding['severity']}: {finding['code'].replace('_', ' ')} {finding['subject']}").classes(
+                    "strong"
+                )
                 if finding["spans"]:
                     look = (
                         f"document.querySelector('omni-plot').show({finding['spans'][0][0]}, {finding['spans'][-1][1]})"

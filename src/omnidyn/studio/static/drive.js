@@ -72,7 +72,7 @@ class Drive extends HTMLElement {
       this.varied[kind]?.(named ? ranges[kind][2] : choice);
     }
     this.note.textContent = breakaway.every((v) => v === null) ? ''
-      : `moves from ${['forward', 'sideways', 'turning'].map((n, k) => `${n} ${breakaway[k] === null ? '-' : short(breakaway[k])} ${unit}`).join(', ')}`;
+      : `moves from ${['forward', 'sideways', 'turning'].map((n, k) => `${n} ${breakaway[k] === null ? '-' : +breakaway[k].toPrecision(3)} ${unit}`).join(', ')}`;
   }
   // Buttons to hold down, where there is no keyboard
   pads(parent) {

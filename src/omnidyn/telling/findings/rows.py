@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from omnidyn.document import all_of
 from omnidyn.statement import ERROR, Statement
-from omnidyn.telling.sentence import Sentence, by_number, counted
+from omnidyn.telling.sentence import Sentence
+from omnidyn.telling.small_words import by_number, counted
 
 COARSE_CLOCK = "do not sort the rows: look at how the time is written (milliseconds without leading zeros?), and \
 whether another column is the clock (`column` t=NAME:UNIT)"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from omnidyn.statement import NOTE, Statement
 from omnidyn.telling.findings.wiring import compared
-from omnidyn.telling.sentence import SOURCES, Sentence, by_number, either, names, read_as
+from omnidyn.telling.sentence import Sentence, either
+from omnidyn.telling.small_words import SOURCES, by_number, names, read_as
 
 REASONS = {
     "motor": "current and speed of its motor change",

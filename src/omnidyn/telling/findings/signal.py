@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from omnidyn.document import all_of
 from omnidyn.statement import NOTE, Statement
-from omnidyn.telling.sentence import SOURCES, Sentence, by_number, either, names
+from omnidyn.telling.sentence import Sentence, either
+from omnidyn.telling.small_words import SOURCES, by_number, names
 
 LIMITS = {
     "duty": "full duty",

@@ -9,7 +9,8 @@ from omnidyn.document import all_of, short
 from omnidyn.findings.needs import LOOP_REMEDY
 from omnidyn.statement import SEVERITIES, Statement
 from omnidyn.telling.logs import in_brief
-from omnidyn.telling.sentence import Sentence, by_number, counted, either
+from omnidyn.telling.sentence import Sentence, either
+from omnidyn.telling.small_words import by_number, counted
 
 OF_ROBOT = {
     "": "",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from omnidyn.statement import Statement
-from omnidyn.telling.sentence import SOURCES, Sentence, by_number, either
+from omnidyn.telling.sentence import Sentence, either
+from omnidyn.telling.small_words import SOURCES, by_number
 
 SLOTS = "put the columns right in the mapping (`column`)"
 

@@ -72,9 +72,6 @@ def is_command(topic: str) -> bool:
     return words.COMMAND in read_name(topic.strip("/").replace("/", "_")).roles
 
 
-# ---- picking --------------------------------------------------------------------------------------------
-
-
 def _stamp(layout: MessageLayout, prefix: str = "header.stamp") -> dict[str, str]:
     paths = {SECONDS: f"{prefix}.sec", NANOSECONDS: f"{prefix}.nanosec"}
     return paths if all(path in layout.numbers for path in paths.values()) else {}
@@ -142,9 +139,6 @@ def _transforms(layout: MessageLayout) -> Picks:
         **{f"q{a}": f"{of}.transform.rotation.{a}" for a in "xyzw"},
     }
     return {**_stamp(layout, f"{of}.header.stamp"), **paths}
-
-
-# ---- columns --------------------------------------------------------------------------------------------
 
 
 def heading_of(x: FloatArray, y: FloatArray, z: FloatArray, w: FloatArray) -> FloatArray:
