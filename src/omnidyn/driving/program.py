@@ -191,7 +191,7 @@ def _farthest(pose: FloatArray) -> tuple[float, float, float]:
 
 
 def _size(displacement: Sequence[float]) -> float:
-    return float(np.hypot(*displacement[:2]) + TURN_ONLY * abs(displacement[2]))
+    return float(np.hypot(displacement[0], displacement[1]) + TURN_ONLY * abs(displacement[2]))
 
 
 def in_words(displacement: Sequence[float]) -> str:
