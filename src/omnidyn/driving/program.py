@@ -169,12 +169,11 @@ class DriveProgram(Displayable):
         }
 
     def from_leg(self, number: int) -> DriveProgram:
-        """The program from a leg on, counted from 0."""
+        """The program from a leg on, counted from 0, after half a second of rest."""
         if not 0 <= number < len(self.legs):
             raise InputError("no such leg", got=number, expected=f"0 to {len(self.legs) - 1}", where="leg")
-        rest = round(0.5 / self.dt)
-        first = max(self.legs[number].first - rest, 0)
-        return replace(self, inputs=self.inputs[first:])
+        left = self.inputs[self.legs[number].first :]  # what is before it may be the end of the leg before
+        return replace(self, inputs=np.concatenate([np.zeros((round(0.5 / self.dt), left.shape[1])), left]))
 
 
 def way_between(start: FloatArray, end: FloatArray) -> tuple[float, float, float]:
@@ -191,7 +190,7 @@ def _farthest(pose: FloatArray) -> tuple[float, float, float]:
 
 
 def _size(displacement: Sequence[float]) -> float:
-    return float(np.hypot(*displacement[:2]) + TURN_ONLY * abs(displacement[2]))
+    return float(np.hypot(displacement[0], displacement[1]) + TURN_ONLY * abs(displacement[2]))
 
 
 def in_words(displacement: Sequence[float]) -> str:
