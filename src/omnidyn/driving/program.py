@@ -172,9 +172,8 @@ class DriveProgram(Displayable):
         """The program from a leg on, counted from 0."""
         if not 0 <= number < len(self.legs):
             raise InputError("no such leg", got=number, expected=f"0 to {len(self.legs) - 1}", where="leg")
-        rest = round(0.5 / self.dt)
-        first = max(self.legs[number].first - rest, 0)
-        return replace(self, inputs=self.inputs[first:])
+        rest = np.zeros((round(0.5 / self.dt), self.inputs.shape[1]))
+        return replace(self, inputs=np.concatenate([rest, self.inputs[self.legs[number].first :]]))
 
 
 def way_between(start: FloatArray, end: FloatArray) -> tuple[float, float, float]:
