@@ -60,6 +60,7 @@ _HOME = {
     "path": "omnidyn.control.paths.path",
     "path_demand": "omnidyn.control.demand",
     "plan": "omnidyn.identification.planning.plan",
+    "plan_rig": "omnidyn.identification.planning.rig",
     "preset_names": "omnidyn.model.robot_file",
     "read_commands": "omnidyn.logs.command_file",
     "read_log": "omnidyn.logs.read_log",
@@ -109,6 +110,7 @@ if TYPE_CHECKING:
     from omnidyn.identification.live.live import Live
     from omnidyn.identification.methods import MotorFit, MotorLine, OutputError, SteadyState
     from omnidyn.identification.planning.plan import plan
+    from omnidyn.identification.planning.rig import plan_rig
     from omnidyn.logs.command_file import read_commands
     from omnidyn.logs.read_log import read_log
     from omnidyn.logs.run_file import write_run

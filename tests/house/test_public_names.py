@@ -42,6 +42,7 @@ PUBLIC = [
     "path",
     "path_demand",
     "plan",
+    "plan_rig",
     "preset_names",
     "read_commands",
     "read_log",

@@ -50,10 +50,10 @@ def test_a_slow_loop_is_dahl_s_closed_form(axis):
     """Half a loop from F0: F = C - (C - F0) exp(-sigma0 (x - x0)/C), and back with the other sign."""
     own = study(law="dahl", stiffness=STIFF).axes[axis]
     level, stiff = COULOMB[axis], STIFF[axis]
-    count = len(own.way) // 3
-    up = level * (1.0 - np.exp(-stiff * own.way[:count] / level))
+    count = len(own.travel) // 3
+    up = level * (1.0 - np.exp(-stiff * own.travel[:count] / level))
     np.testing.assert_allclose(own.loop[:count], up, rtol=1e-9, atol=1e-12)
-    gone = own.way[count] - own.way[count : 2 * count]
+    gone = own.travel[count] - own.travel[count : 2 * count]
     back = -level + (level + up[-1]) * np.exp(-stiff * gone / level)
     np.testing.assert_allclose(own.loop[count : 2 * count], back, rtol=1e-9, atol=1e-12)
     assert own.bends == pytest.approx(level / stiff)
@@ -63,7 +63,7 @@ def test_a_slow_loop_is_dahl_s_closed_form(axis):
 def test_a_loop_has_the_slope_of_its_law(exponent):
     """dF/dx = sigma0 w^a on the way up, by differences."""
     own = study(law="dahl", stiffness=STIFF, dahl_exponent=exponent).axes[0]
-    way, force = own.way[:60], own.loop[:60]
+    way, force = own.travel[:60], own.loop[:60]
     left = np.maximum(1.0 - 0.5 * (force[1:] + force[:-1]) / COULOMB[0], 0.0)
     np.testing.assert_allclose(np.diff(force) / np.diff(way), STIFF[0] * left**exponent, rtol=0.01, atol=2.0)
 

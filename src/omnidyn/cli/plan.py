@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,6 +21,7 @@ from omnidyn.files import check_output, write_atomic
 from omnidyn.model.robot_file import robot_to_toml
 
 if TYPE_CHECKING:
+    from omnidyn.document import Document
     from omnidyn.identification.planning.planned import Plan
 
 
@@ -35,7 +36,16 @@ def plan(
     ),
     area: str = typer.Option("3x3", metavar="XxY", help="Free floor [m]; it begins in the middle, along x."),
     time: float = typer.Option(60.0, metavar="S", help="Of all of it [s]."),
-    for_: str = typer.Option("", "--for", metavar="KEY", help="The number to learn best; default: all of them."),
+    for_: str = typer.Option(
+        "",
+        "--for",
+        metavar="KEY",
+        help="The number to learn best; A for the sum of all squared errors, ONE,OTHER for two explanations; default: "
+        "the volume of all intervals.",
+    ),
+    next_: bool = typer.Option(
+        False, "--next", help="ROBOT is a fit: plan the next drive, for the widest of its intervals."
+    ),
     free: Annotated[
         list[str] | None,
         typer.Option("--free", metavar="KEY", help="What is to be learnt; default: as identify. Repeatable."),
@@ -48,6 +58,17 @@ def plan(
             help="What is logged, and its std: wheel_speed=0.05, twist=0.02,0.02,0.1. Repeatable. Default: [sensors].",
         ),
     ] = None,
+    rig: bool = typer.Option(
+        False, "--rig", help="One motor of ROBOT on a bench: first motion and stop both ways, gain, lag, offset, curve."
+    ),
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            metavar="NAME=VALUE",
+            help="current=A of all motors together, heat=W of the hottest, traction=SHARE of the load. Repeatable.",
+        ),
+    ] = None,
     rate: float = typer.Option(100.0, metavar="HZ", help="Of commands and of the log."),
     picture: str = typer.Option("", "--picture", metavar="FILE", help="Draw it, as .png or .svg."),
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
@@ -58,34 +79,64 @@ def plan(
     A program of moves, from rest to rest, that stay inside a room, and how well each number will be known after it.
     Drive it, log it, and give the log to identify.
     """
-    files = [out, _check_file(out), str(Path(out).with_suffix(".json"))] if out else []
+    files = [out, *([] if rig else [_check_file(out)]), str(Path(out).with_suffix(".json"))] if out else []
     for path in files:
         check_output(path, force)
     refuse_picture(picture, force)
     keep_inputs([], [robot], [], *files, picture)
-    sizes, stds = _sizes(area), _noise(noise or [])
+    sizes, stds = _sizes(area), _named_numbers("--noise", noise, "such as twist=0.02,0.02,0.1")
+    limits = _named_numbers("--limit", limit, "such as current=10")
+    if next_ and for_:
+        raise InputError("both --next and --for", expected="one of them: --next is for the widest interval of a fit")
     loaded, source = omnidyn.load_robot(robot), robot_input(robot)
+    if rig:
+        unused = {"--for": for_, "--next": next_, "--free": free, "--limit": limit, "--picture": picture}
+        if given := [flag for flag, value in unused.items() if value]:
+            raise InputError(f"{given[0]} is for a whole robot, --rig for one motor", expected="one of them")
+        with shown_progress("planning") as progress:
+            of_motor = omnidyn.plan_rig(loaded, time, noise=stds, rate=rate, progress=progress)
+        if out:
+            omnidyn.write_run(of_motor.commands(), out, force=force)
+            _promise(of_motor.document(), source, out, force)
+        tell(of_motor.document(), json, provenance([source]), output=out or None)
+        if not json:
+            _say_files(files)
+        return
     with shown_progress("planning") as progress:
-        made = omnidyn.plan(loaded, sizes, time, free=free, aim=for_, noise=stds, rate=rate, progress=progress)
+        made = omnidyn.plan(
+            loaded,
+            sizes,
+            time,
+            free=free,
+            aim="next" if next_ else for_,
+            noise=stds,
+            rate=rate,
+            progress=progress,
+            **(limits or {}),
+        )
     if out:
         for path, held_out in zip(files, (False, True), strict=False):
             _write(made, held_out, path, force)
-        program, check = (sha256(Path(path).read_bytes()).hexdigest() for path in files[:2])
-        promised = as_json(
-            made.document(),
-            provenance([source]),
-            program_sha256=program,
-            check_sha256=check,
-            robot_file=robot_to_toml(loaded),
-        )
-        write_atomic(files[-1], to_json(promised) + "\n", force)
+        check = sha256(Path(files[1]).read_bytes()).hexdigest()
+        _promise(made.document(), source, out, force, check_sha256=check, robot_file=robot_to_toml(loaded))
     tell(made.document(), json, provenance([source]), output=out or None)
     if picture:
         from omnidyn.report.figures.plan import draw_plan
 
         write_picture(draw_plan(made), picture, force)
     if not json:
-        say(f"omnidyn: wrote {', '.join(files)}" if out else "omnidyn: nothing written; -o FILE writes the program")
+        _say_files(files)
+
+
+def _say_files(files: list[str]) -> None:
+    say(f"omnidyn: wrote {', '.join(files)}" if files else "omnidyn: nothing written; -o FILE writes the program")
+
+
+def _promise(document: Document, source: dict[str, str], out: str, force: bool, **more: str) -> None:
+    """Write what a plan promises beside its program, with the hash of that."""
+    program = sha256(Path(out).read_bytes()).hexdigest()
+    promised = as_json(document, provenance([source]), program_sha256=program, **more)
+    write_atomic(str(Path(out).with_suffix(".json")), to_json(promised) + "\n", force)
 
 
 def _check_file(out: str) -> str:
@@ -105,12 +156,13 @@ def _sizes(area: str) -> tuple[float, ...]:
         raise InputError("not the size of a room", got=area, expected="such as 3x3", where="--area") from None
 
 
-def _noise(given: list[str]) -> dict[str, tuple[float, ...] | float] | None:
-    stds: dict[str, tuple[float, ...] | float] = {}
-    for text in given:
-        channel, sign, numbers = text.partition("=")
+def _named_numbers(flag: str, given: list[str] | None, example: str) -> dict[str, Any] | None:
+    """Name -> number, or numbers; None where nothing is given."""
+    values_by_name: dict[str, Any] = {}
+    for text in given or []:
+        name, sign, numbers = text.partition("=")
         if not sign:
-            raise InputError("not CHANNEL=STD", got=text, expected="such as twist=0.02,0.02,0.1", where="--noise")
-        values = tuple(number_list("--noise", numbers))
-        stds[channel] = values[0] if len(values) == 1 else values
-    return stds or None
+            raise InputError("not NAME=NUMBER", got=text, expected=example, where=flag)
+        values = tuple(number_list(flag, numbers))
+        values_by_name[name] = values[0] if len(values) == 1 else values
+    return values_by_name or None

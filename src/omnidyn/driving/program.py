@@ -169,11 +169,11 @@ class DriveProgram(Displayable):
         }
 
     def from_leg(self, number: int) -> DriveProgram:
-        """The program from a leg on, counted from 0."""
+        """The program from a leg on, counted from 0, after half a second of rest."""
         if not 0 <= number < len(self.legs):
             raise InputError("no such leg", got=number, expected=f"0 to {len(self.legs) - 1}", where="leg")
-        rest = np.zeros((round(0.5 / self.dt), self.inputs.shape[1]))
-        return replace(self, inputs=np.concatenate([rest, self.inputs[self.legs[number].first :]]))
+        left = self.inputs[self.legs[number].first :]  # what is before it may be the end of the leg before
+        return replace(self, inputs=np.concatenate([np.zeros((round(0.5 / self.dt), left.shape[1])), left]))
 
 
 def way_between(start: FloatArray, end: FloatArray) -> tuple[float, float, float]:

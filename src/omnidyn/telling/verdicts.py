@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from omnidyn.document import all_of, short
 from omnidyn.model.keys import in_words
 from omnidyn.sensors import COUNTED
@@ -12,6 +14,22 @@ from omnidyn.telling.sentence import Sentence
 WHERE = {"fitted": "on the fitted logs", "held out": "on logs held out"}
 NAMED = 4  # shapes that a sentence names
 
+EXPLANATIONS = {  # that are no numbers of a robot file
+    "gain": "the gain of the voltages",
+    "dead_band": "a dead band",
+    "fade": "a fading supply",
+    "tilt": "a tilted floor",
+    "push": "a push on the body",
+}
+NUISANCE_UNITS = {"dead_band": "V", "tilt.x": "N", "tilt.y": "N", "push.x": "N", "push.y": "N", "push.yaw": "N m"}
+LIMIT_UNITS = {"current": " A", "heat": " W", "traction": ""}
+LEFT_OUT = {  # why a plan leaves out moves
+    "room": "would leave the room",
+    "rest": "do not come to rest in 2 s",
+    "traction": "ask too much grip",
+    "current": "draw too much current",
+    "still": "do not move it",
+}
 SHORTEST_WAY = 0.01  # [m] that a plan is said to go
 
 
@@ -40,6 +58,66 @@ def _planned(statement: Statement) -> str:
     words = f"{begin} {shown} of {statement.subject}, the widest ({in_words(widest)}) within "
     words += f"{short(max(0.1, 100.0 * numbers['share']))} %"
     return f"{words}; not {names_of(missing)}" if missing else words
+
+
+def _planned_rig(statement: Statement) -> str:
+    """ "60 s on the bench tell all 9 numbers of a motor of axebot, the widest (first motion backward) within 4 %" """
+    numbers = statement.numbers
+    begin = f"{numbers['seconds']:.3g} s on the bench tell"
+    if not numbers["told"]:
+        return f"{begin} no number of a motor of {statement.subject}"
+    share = "all" if not numbers["missing"] else f"{numbers['told']} of"
+    words = (
+        f"{begin} {share} {numbers['count']} numbers of a motor of {statement.subject}, the widest "
+        f"({numbers['widest']}) within {_within(numbers['share'])}"
+    )
+    return f"{words}; not {all_of([*numbers['missing']])}" if numbers["missing"] else words
+
+
+def _planned_next(statement: Statement) -> str:
+    """ "58 s more of driving bring the widest interval of axebot from 27 % (viscous friction turning) to 6 % (..)" """
+    numbers = statement.numbers
+    before, after = (_within(numbers[share]) for share in ("known", "share"))
+    return (
+        f"{numbers['seconds']:.3g} s more of driving bring the widest interval of {statement.subject} from {before} "
+        f"({in_words(numbers['before'])}) to {after} ({in_words(numbers['widest'])})"
+    )
+
+
+def _within(share: float) -> str:
+    """ "2.9 %", or what is not known."""
+    return f"{short(max(0.1, 100.0 * share))} %" if math.isfinite(share) else "unknown"
+
+
+def _tells_apart(statement: Statement) -> str:
+    """From what size on each of two explanations is told from the other."""
+    one, other = (EXPLANATIONS.get(name, in_words(name)) for name in statement.numbers["explanations"])
+    sizes = [
+        f"{EXPLANATIONS.get(name.partition('.')[0], in_words(name))} {_size(name, size)}"
+        for name, size in statement.numbers["sizes"].items()
+    ]
+    return f"it tells {one} from {other}, with all of both free: within {all_of(sizes)}"
+
+
+def _size(name: str, size: float) -> str:
+    """Half an interval: of a nuisance in its unit, else as a share."""
+    unit = NUISANCE_UNITS.get(name)
+    return f"{short(100.0 * size)} %" if unit is None else f"{name.partition('.')[2]} {short(size)} {unit}".strip()
+
+
+def _asks(statement: Statement) -> str:
+    """What a plan asks of battery, motors and wheels, and which moves were left out for what."""
+    numbers = statement.numbers
+    words = (
+        f"the motors draw up to {short(numbers['current'])} A together, heat the hottest winding by "
+        f"{short(numbers['heat'])} W in the mean, and a wheel pushes with up to {short(numbers['traction'])} of what "
+        "it carries"
+    )
+    reasons = [f"{numbers['left_out'][why]} that {LEFT_OUT[why]}" for why in LEFT_OUT if why in numbers["left_out"]]
+    limits = {why: value for why, value in numbers["limits"].items() if math.isfinite(value)}
+    if limits:
+        words += f" (limits: {all_of([f'{why} {short(value)}{LIMIT_UNITS[why]}' for why, value in limits.items()])})"
+    return f"{words}; of {numbers['tried']} moves it leaves out {all_of(reasons)}" if reasons else words
 
 
 def _inside(statement: Statement) -> str:
@@ -162,6 +240,14 @@ def _of_groups(statement: Statement) -> str:
 
 SENTENCES = {
     "planned": Sentence(_planned),
+    "planned_next": Sentence(_planned_next),
+    "planned_rig": Sentence(_planned_rig),
+    "rig_turns": Sentence(
+        "one motor, its wheel off the ground, from rest; it turns at up to {top:.3g} rad/s, under {limit:.3g} {unit}; "
+        "drive it once, log it from its first row on, and identify it as `what` motors"
+    ),
+    "plan_tells_apart": Sentence(_tells_apart),
+    "plan_asks": Sentence(_asks),
     "plan_stays_inside": Sentence(_inside),
     "plan_records": Sentence(_records),
     "plan_finer_than_models": Sentence(_finer),

@@ -117,7 +117,7 @@ def test_derivatives_are_those_of_the_general_engine(name):
     (seen,), _ = late_samples(robot, VoltageProgram(t, voltage, np.zeros(3)), directions, [0.0], 1e-7, PLACE)
     assert moved(ready.numbers, ready.plants, EPS) is not None
     assert np.abs(seen.twist - true.run.twist).max() <= 1e-6
-    pose = seen.dway[..., [PATH, PATH + 1, 0]]
+    pose = seen.dtravel[..., [PATH, PATH + 1, 0]]
     for found, right in ((seen.dtwist, true.twist), (pose, true.pose)):
         by = np.moveaxis(found, 1, 2) / ready.scale
         size = (right**2).sum(axis=(0, 1))
@@ -140,7 +140,7 @@ def test_a_look_between_steps_is_that_of_a_finer_grid(name):
     fine = derivatives(implicit(robot), np.repeat(voltage, 2, axis=0), cut, keys, tol=1e-8)
     seen, rows = looks[1], slice(1, 240, 2)
     assert np.abs(seen.twist[1:] - fine.run.twist[rows]).max() <= 2e-6
-    assert np.abs(seen.way[1:, PATH:] - fine.run.pose[rows, :2]).max() <= 1e-6
+    assert np.abs(seen.travel[1:, PATH:] - fine.run.pose[rows, :2]).max() <= 1e-6
     size = np.abs(fine.twist).max(axis=(0, 1)) * ready.scale
     assert (
         np.abs(np.moveaxis(seen.dtwist[1:], 1, 2) - fine.twist[rows] * ready.scale).max(axis=(0, 1)) <= 1e-4 * size
@@ -171,7 +171,10 @@ def test_derivatives_by_volts_pushes_and_the_start_are_differences():
     seen = run(0.0, "start", directions)
     for k, name in enumerate(changes):
         up, down = run(1.0, name), run(-1.0, name)
-        for found, ends in ((seen.dtwist[:, k], (up.twist, down.twist)), (seen.dway[:, k], (up.way, down.way))):
+        for found, ends in (
+            (seen.dtwist[:, k], (up.twist, down.twist)),
+            (seen.dtravel[:, k], (up.travel, down.travel)),
+        ):
             by = (ends[0] - ends[1]) / (2.0 * step)
             assert np.abs(found - by).max() <= 2e-3 * np.abs(by).max(), name
 

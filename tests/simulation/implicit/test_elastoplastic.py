@@ -112,7 +112,7 @@ def test_a_slow_loop_is_stiff_first_and_comes_to_its_level():
     assert own.law == "elasto-plastic (axes)"
     elastic = own.loop <= 0.5 * 2.2
     start = np.flatnonzero(~elastic)[0]
-    np.testing.assert_allclose(own.loop[:start], 1e4 * own.way[:start], rtol=1e-6)
+    np.testing.assert_allclose(own.loop[:start], 1e4 * own.travel[:start], rtol=1e-6)
     assert own.loop[: len(own.loop) // 3][-1] == pytest.approx(2.2, rel=0.01)
 
 

@@ -63,7 +63,7 @@ def test_between_the_rows(robot):
         for k, key in enumerate(KEYS):
             value, width = Key.parse(key).get(robot), 1e-4
             up, down = (at(Key.parse(key).set(robot, value * (1 + s * width)), voltage, 0.01, late) for s in (1, -1))
-            for found, ends in ((own.dtwist[:, k], (up[0], down[0])), (own.dway[:, k, 0], (up[1], down[1]))):
+            for found, ends in ((own.dtwist[:, k], (up[0], down[0])), (own.dtravel[:, k, 0], (up[1], down[1]))):
                 slope = (ends[0] - ends[1]) / (2.0 * width)
                 size = np.nanmax(np.abs(slope), axis=0)
                 assert (np.nanmax(np.abs(found - slope), axis=0) <= 2e-5 * np.max(size) + 1e-6).all(), key

@@ -67,6 +67,7 @@ def flags() -> dict[str, str]:
     words["groups"] = "per"
     words["beside"] = "with"
     words["aim"], words["seconds"] = "for", "time"  # of a plan
+    words["limits"] = "limit"
     words["variables"] = "var"  # of a file of MATLAB
     return {
         name: f"--{word.replace('_', '-')}"

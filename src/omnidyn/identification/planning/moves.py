@@ -34,18 +34,20 @@ SECONDS = (0.6, 1.2, 2.4)
 @dataclass(frozen=True)
 class PlannedMove:
     """direction, shape: of DIRECTIONS and SHAPES. level: share of the largest input. seconds, rest [s]: how long the
-    input lasts, and how long it is 0 then, until the robot stands. The mirror image of both follows."""
+    input lasts, and how long it is 0 then, until the robot stands. The mirror image of both follows, unless it goes one
+    way: turns the robot for what comes next."""
 
     direction: str
     shape: str
     level: float
     seconds: float
     rest: float = 0.0
+    one_way: bool = False
 
     @property
     def duration(self) -> float:
         """With its mirror image [s]."""
-        return 2.0 * (self.seconds + self.rest)
+        return (1.0 if self.one_way else 2.0) * (self.seconds + self.rest)
 
     def input(self, robot: Robot, dt: float) -> FloatArray:
         """Share of the largest input, rows of dt [s], shape (rows, wheels): the move and its rest, no mirror image."""
@@ -56,9 +58,9 @@ class PlannedMove:
         return np.concatenate([driven, np.zeros((round(self.rest / dt), driven.shape[1]))])
 
     def both(self, robot: Robot, dt: float) -> FloatArray:
-        """The same with the mirror image."""
+        """The same with the mirror image, where there is one."""
         once = self.input(robot, dt)
-        return np.concatenate([once, -once])
+        return once if self.one_way else np.concatenate([once, -once])
 
 
 def all_moves() -> list[PlannedMove]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -13,21 +14,16 @@ from omnidyn.arguments import check_order, is_number
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.methods import OutputError
+from omnidyn.identification.output_error.problem.nuisances import PUSH, TILT
+from omnidyn.identification.planning.aims import NEXT, PlanAim, aim_of, fitted_keys, known_of
 from omnidyn.identification.planning.information import Prediction, information_of, told_by
+from omnidyn.identification.planning.limits import GRIP, PlanLimits, limits_of
 from omnidyn.identification.planning.moves import FORWARD, RAMP, SIDEWAYS, STEP, TURN, PlannedMove, all_moves
 from omnidyn.identification.planning.planned import Plan, Predicted
 from omnidyn.identification.planning.recorded import Noise, driven, noise_of, recorded
-from omnidyn.identification.planning.search import (
-    UNKNOWN,
-    Score,
-    TriedMove,
-    chosen,
-    geometric_mean,
-    of_number,
-    tried,
-)
+from omnidyn.identification.planning.search import ROOM, UNKNOWN, TriedMove, chosen, fitting, tried
 from omnidyn.model.drive import DUTY, SPEED
-from omnidyn.model.keys import expand, friction_keys
+from omnidyn.model.keys import expand, find_key, friction_keys
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run
@@ -47,6 +43,7 @@ SLOWEST, FASTEST = 5.0, 1000.0  # [Hz]
 DOUBTED = ("gain", "dead_band")  # what a fit may need beside the numbers of the file: moves must tell that apart too
 SEED = 0  # of the robots and of the noise
 REST = 1.0  # [s] before the first move
+VOLUME = PlanAim().score([])
 
 
 def plan(
@@ -59,6 +56,7 @@ def plan(
     noise: Mapping[str, Any] | None = None,
     rate: float = 100.0,
     progress: Progress = silent,
+    **limits: float,
 ) -> Plan:
     """Which minute of driving tells most about a robot, and how much that is.
 
@@ -71,16 +69,22 @@ def plan(
         robot: What is known now. Robots that may be meant are drawn by the std in its file, else 30 % off.
         area: Free floor along x and y [m]; the robot begins in the middle, along x.
         seconds: Of all of it, with the part that is held out [s].
-        free: What is to be learnt, by keys of the robot file; default: as `identify`.
-        aim: One of these numbers, to learn it best; default: the geometric mean of all standard errors.
+        free: What is to be learnt, by keys of the robot file; default: as `identify`, after a fit what that told.
+        aim: What is to be learnt best. Default, or "D": the geometric mean of all standard errors; "A": the root of the
+            mean of their squares; a key: that number; two keys or nuisances, "gain,friction.axes.coulomb": which of
+            these explanations is right; "next": the widest interval of a robot file that `identify` wrote, beside what
+            its logs told.
         noise: Channel (wheel_angle, wheel_speed, current, twist, pose) -> std of what is recorded, one number or one
             per component; of wheel_angle the step of a count [rad]. Default: by the [sensors] of the robot file, counts
             and poses; where it says nothing of counts, wheel speeds that are differences of 2048 a turn.
         rate: Of commands and of the log [Hz].
         progress: Hears what is done.
+        limits: current=, of all motors together [A]; heat=, of the hottest motor, in the mean of a move [W];
+            traction=, force of a wheel over what it carries; default: 0.8 of the grip of wheels that may slip.
 
-    Raises InputError for a room, a time or a noise that cannot be, and for an aim that is not free; UnsupportedError
-    for a robot whose firmware holds the speeds of its wheels; InsufficientDataError where no move fits into the room.
+    Raises InputError for a room, a time, a limit or a noise that cannot be, for an aim that is not free, and for "next"
+    of a robot that was not identified; UnsupportedError for a robot whose firmware holds the speeds of its wheels;
+    InsufficientDataError where no move is left, or no log of these channels tells two explanations apart.
 
     >>> import omnidyn
     >>> made = omnidyn.plan(omnidyn.load_robot("axebot"), (3.0, 3.0), 30.0, noise={"twist": (0.02, 0.02, 0.1)})
@@ -98,9 +102,10 @@ def plan(
             expected="a robot that takes volts or duties",
             remedy="plan for the same robot without [drive] kind = speed, if its motors can be driven directly",
         )
-    dt = 1.0 / rate
-    planner = _Planner(robot, _robots(robot), dt, noise_of(robot, dt, noise), _question(robot, free))
-    return planner.planned((width, depth), seconds, aim, progress)
+    goal = aim_of(aim, robot)
+    question = _question(robot, free, goal)
+    planner = _planner(robot, 1.0 / rate, noise, question, limits)
+    return replace(planner, aim=goal).planned((width, depth), seconds, progress)
 
 
 def plan_rest(
@@ -127,11 +132,18 @@ def plan_rest(
     What it promises is for the logs of both drives together. Raises as `plan`.
     """
     width, depth = _room(area)
-    dt = 1.0 / rate
-    planner = _Planner(
-        robot, _robots(robot), dt, noise_of(robot, dt, noise), _question(robot, tuple(promised)), driven, promised
-    )
-    return planner.that_tells().planned((width, depth), seconds / (1.0 - HELD_OUT_SHARE), "", progress)
+    planner = _planner(robot, 1.0 / rate, noise, _question(robot, tuple(promised), PlanAim()), {})
+    planner = replace(planner, driven=driven, promised=promised)
+    return planner.that_tells().planned((width, depth), seconds / (1.0 - HELD_OUT_SHARE), progress)
+
+
+def _planner(
+    robot: Robot, dt: float, noise: Mapping[str, Any] | None, question: OutputError, limits: Mapping[str, float]
+) -> _Planner:
+    learns_grip = any(key.startswith(GRIP) for key in (*robot.priors, *(question.free or ())))
+    rolling = robot if learns_grip else robot.replace(wheels=robot.wheels.replace(traction_mu=None))
+    kept = limits_of(robot, limits, learns_grip)
+    return _Planner(robot, _robots(robot), dt, noise_of(robot, dt, noise), question, kept, rolling)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,41 +157,40 @@ class _Programs:
 
 @dataclass(frozen=True, eq=False)
 class _Planner:
-    """What moves do with a robot, and with others that may be meant, and what they tell."""
+    """What moves do with a robot, and with others that may be meant, and what they tell. rolling: by which moves are
+    compared, wheels as if they rolled, a tenth of the work; whole plans are compared, and predicted, with `robot`."""
 
     robot: Robot
     robots: Sequence[Robot]
     dt: float
     noise: Noise
     question: OutputError
+    limits: PlanLimits
+    rolling: Robot
+    aim: PlanAim = field(default_factory=PlanAim)
     driven: FloatArray | None = None  # and recorded already, as share of the largest input
     promised: Mapping[str, float] = field(default_factory=dict)  # half the interval of each number, as a share of it
 
-    def planned(self, area: tuple[float, float], seconds: float, aim: str, progress: Progress) -> Plan:
+    def planned(self, area: tuple[float, float], seconds: float, progress: Progress) -> Plan:
         """A plan that stays inside the room, in so many seconds with the part that is held out."""
         width, depth = area
         border = ROOM_SHARE * 0.5 * min(width, depth)
         progress(Report("trying moves"))
-        moves = self.tried()
+        moves, left_out = self.tried(), Counter[str]()
         for _ in range(ATTEMPTS):
-            fitting = [one for one in moves if one.reach <= border and one.moved]
+            kept, left_out = fitting(moves, border, self.limits)
+            if not kept:
+                break
             try:
-                made = self.search(fitting, seconds, aim, progress)
+                made = self.search(kept, seconds, progress)
             except InsufficientDataError:  # nothing that fits moves it so far that its sensors see it
                 break
             progress(Report("driving it with robots that may be meant"))
             reach = self.reach((made.share, made.held_out))
             if reach[0] < 0.5 * width and reach[1] < 0.5 * depth:
-                return self.predicted(made, area, reach)
+                return replace(self.predicted(made, area, reach), left_out=dict(left_out), tried=len(moves))
             border *= SMALLER
-        raise InsufficientDataError(
-            "no plan moves the robot visibly and stays inside the room, for all robots that may be meant",
-            got=f"{width:g} m x {depth:g} m",
-            expected="a larger room, or a robot that is known better",
-            remedy="drive it by hand for a minute, slowly and both ways along each axis, and plan for what identify "
-            "makes of that log",
-            where="area",
-        )
+        raise _no_plan(width, depth, left_out, self.limits)
 
     def that_tells(self) -> _Planner:
         """The same without what was driven, where that tells nothing: it had hardly begun."""
@@ -192,60 +203,99 @@ class _Planner:
         return self
 
     def tried(self) -> list[TriedMove]:
-        """All moves that end at rest, with the one that goes farthest of the robots beside that of the file."""
+        """All moves, of the robot of the file, and of those that go farthest and least far."""
+        slips = self.rolling.wheels.traction_mu is not None
+        robots = [one if slips else one.replace(wheels=self.rolling.wheels) for one in self.robots]
         probe = PlannedMove(FORWARD, STEP, 1.0, 1.2)
-        distance = [_farthest(driven(robot, probe.input(robot, self.dt), self.dt)) for robot in self.robots]
-        ends = [self.robot, self.robots[int(np.argmax(distance))], self.robots[int(np.argmin(distance))]]
-        return [found for move in all_moves() if (found := tried(move, ends, self.dt)) is not None]
+        distance = [_farthest(driven(robot, probe.input(robot, self.dt), self.dt)) for robot in robots]
+        ends = [self.rolling, robots[int(np.argmax(distance))], robots[int(np.argmin(distance))]]
+        return [tried(move, ends, self.limits, self.dt) for move in all_moves()]
 
-    def search(self, moves: Sequence[TriedMove], seconds: float, aim: str, progress: Progress) -> _Programs:
+    def search(self, moves: Sequence[TriedMove], seconds: float, progress: Progress) -> _Programs:
         """The best of a few plans from these moves, each from a part of them, compared whole."""
         opening = self._left_of(_opening(moves))
         candidates = [one.move for one in moves]
         rng = np.random.default_rng(SEED)
-        runs = [self._recorded(self.robot, move.both(self.robot, self.dt), rng) for move in candidates]
-        asked = replace(self.question, nuisances=DOUBTED)
-        names, information = information_of(runs, self.robot, asked)
-        score = self._score(names, aim)
-        begun = information[[candidates.index(move) for move in opening]].sum(axis=0)
+        runs = [self._recorded(self.rolling, move.both(self.robot, self.dt), rng) for move in candidates]
+        asked = replace(self.question, nuisances=tuple(dict.fromkeys((*DOUBTED, *self.aim.nuisances))))
+        names, information = information_of(runs, self.rolling, asked)
+        earlier = self._known(names)
+        score = self.aim.score(self.aim.places(names, sum(find_key(name) is not None for name in names)))
+        begun = earlier + information[[candidates.index(move) for move in opening]].sum(axis=0)
         if self.driven is not None:
-            told_names, more = information_of([self._recorded(self.robot, self.driven, rng)], self.robot, asked)
-            places = [names.index(name) for name in told_names]  # a short drive tells nothing of some
+            shown_names, more = information_of([self._recorded(self.rolling, self.driven, rng)], self.rolling, asked)
+            places = [names.index(name) for name in shown_names]  # a short drive tells nothing of some
             begun[np.ix_(places, places)] += more[0]
         time = (1.0 - HELD_OUT_SHARE) * seconds - REST - sum(move.duration for move in opening)
         best, best_score = None, math.inf
+        turn = self._quarter_turn(candidates) if {TILT, PUSH} <= set(self.aim.nuisances) else None
+        time -= 2.0 * turn.duration if turn else 0.0
+        # what is best by the volume is often good for another aim: it is compared too
+        scores = list(dict.fromkeys((score, VOLUME) if self.aim != PlanAim() else (score,)))
         count = SEARCHES_OF_REST if self.promised else SEARCHES
+        question = self.question if self.promised else asked  # a promise is without doubts
         for k in range(count):
             progress(Report("choosing moves", k, count))
             kept = np.flatnonzero(rng.random(len(candidates)) < KEPT) if k else np.arange(len(candidates))
-            order = [int(kept[i]) for i in chosen([candidates[j] for j in kept], information[kept], time, score, begun)]
-            made = self._programs(opening, [candidates[j] for j in order], seconds)
-            question = self.question if self.promised else asked  # a promise is without doubts
-            predictions = told_by(self._logs(self.robot, made.share, rng), self.robot, question)
-            of_plan = _beside(predictions, self.promised) if self.promised else _of(predictions, aim)
-            if best is None or of_plan < best_score:
-                best, best_score = made, of_plan
+            for by in scores:
+                some = [candidates[j] for j in kept]
+                order = [int(kept[i]) for i in chosen(some, information[kept], time, by, begun)]
+                made = self._programs(opening, [candidates[j] for j in order], seconds, turn)
+                logs = self._logs(self.robot, made.share, np.random.default_rng(SEED))
+                of_plan = self._score(told_by(logs, self.robot, question, is_coarse=True))
+                if best is None or of_plan < best_score:
+                    best, best_score = made, of_plan
         assert best is not None
         return best
 
-    def _score(self, names: tuple[str, ...], aim: str) -> Score:
-        if not aim:
-            return geometric_mean
-        free = [name for name in names if name not in DOUBTED]
-        if aim not in free:
-            raise InputError("not a number that is free", got=aim, expected=", ".join(free), where="aim")
-        return of_number(names.index(aim))
+    def _known(self, names: Sequence[str]) -> FloatArray:
+        """What the fit before tells of these numbers, where the plan is for the next drive. Shape (names, names)."""
+        return known_of(self.robot, names) if self.aim.criterion == NEXT else np.zeros((len(names), len(names)))
 
-    def _programs(self, opening: Sequence[PlannedMove], moves: Sequence[PlannedMove], seconds: float) -> _Programs:
-        """The rows of a plan. Held out: a step from rest along each axis, then its moves once more, other side first,
-        as many as there is time for."""
+    def _beside(self, prediction: Prediction) -> Prediction:
+        """The prediction beside what the fit before told."""
+        if self.aim.criterion != NEXT:
+            return prediction
+        return prediction.beside(self._known(prediction.names[: prediction.robot_count]))
+
+    def _score(self, prediction: Prediction) -> float:
+        """That of a whole plan: less is better. Of a promise, how far the widest interval is beyond it."""
+        if self.promised:
+            return max(prediction.of(name) / min(half, UNKNOWN) for name, half in self.promised.items())
+        after = self._beside(prediction)
+        places = self.aim.places(after.names, after.robot_count)
+        return self.aim.of_std(np.array([min(after.of(after.names[k]), UNKNOWN) for k in places]))
+
+    def _quarter_turn(self, moves: Sequence[PlannedMove]) -> PlannedMove | None:
+        """The step that turns the robot most nearly by a quarter: a floor that is not level pulls the other way then,
+        what pushes the body does not."""
+        turns = [replace(move, one_way=True) for move in moves if move.direction == TURN and move.shape == STEP]
+        off = [
+            abs((float(np.asarray(driven(self.rolling, move.input(self.robot, self.dt), self.dt).pose)[-1, 2]))
+            % np.pi - 0.5 * np.pi)
+            for move in turns
+        ]  # fmt: skip
+        return turns[int(np.argmin(off))] if turns else None
+
+    def _programs(
+        self,
+        opening: Sequence[PlannedMove],
+        moves: Sequence[PlannedMove],
+        seconds: float,
+        turn: PlannedMove | None,
+    ) -> _Programs:
+        """The rows of a plan, every other move after a `turn`, where there is one. Held out: a step from rest along
+        each axis, then its moves once more, other side first, as many as there is time for."""
         program = [*opening, *moves]
+        if turn:
+            back = replace(turn, level=-turn.level)
+            program = [*opening, *moves[::2], turn, *moves[1::2], back]
         rows = [move.both(self.robot, self.dt) for move in program]
         starts = REST + self.dt * np.cumsum([0, *(len(row) for row in rows)])
         rest = np.zeros((round(REST / self.dt), self.robot.wheels.count))
         remaining, held_out = max(HELD_OUT_SHARE * seconds - REST, min(move.duration for move in program)), [rest]
         for move in dict.fromkeys(reversed(program)):
-            if move.duration <= remaining:
+            if not move.one_way and move.duration <= remaining:
                 held_out.append(-move.both(self.robot, self.dt))
                 remaining -= move.duration
         moved = tuple((float(start), move) for start, move in zip(starts[:-1], program, strict=True))
@@ -260,22 +310,31 @@ class _Planner:
     def predicted(self, made: _Programs, area: tuple[float, float], reach: tuple[float, float]) -> Plan:
         """The plan, with what the fit would say of its log for each robot that may be meant."""
         rng = np.random.default_rng(SEED)
-        predictions = [told_by(self._logs(robot, made.share, rng), robot, self.question) for robot in self.robots]
+        predictions = [
+            self._beside(told_by(self._logs(robot, made.share, rng), robot, self.question)) for robot in self.robots
+        ]
         values = told_by(self._logs(self.robot, made.share, rng), self.robot, self.question, cures=True)
-        halves = {name: 2.0 * np.array([one.of(name) for one in predictions]) for name in values.names}
+        apart = self._apart(values)
+        names = values.names[: values.robot_count]
+        halves = {name: 2.0 * np.array([one.of(name) for one in predictions]) for name in names}
+        before = np.diag(np.linalg.pinv(self._known(names), hermitian=True))
         predicted = {
-            name: Predicted(float(value), float(np.median(halves[name])), float(halves[name].max()))
-            for name, value in zip(values.names, values.value, strict=True)
+            name: Predicted(
+                float(value),
+                float(np.median(halves[name])),
+                float(halves[name].max()),
+                2.0 * math.sqrt(variance) if variance > 0.0 else math.inf,
+            )
+            for name, value, variance in zip(names, values.value, before, strict=False)
         }
         is_duty = self.robot.drive.kind == DUTY
         limit = np.ones(1) if is_duty else np.broadcast_to(self.robot.motor.voltage_limit, self.robot.wheels.count)
-        unit = DUTY if is_duty else "V"
         return Plan(
             self.robot,
             self.dt,
             made.share,
             made.held_out,
-            unit,
+            DUTY if is_duty else "V",
             limit,
             made.moves,
             area,
@@ -284,7 +343,30 @@ class _Planner:
             self.noise,
             len(self.robots),
             values.blind,
+            aim=self.aim,
+            apart=apart,
+            limits=self.limits,
         )
+
+    def _apart(self, prediction: Prediction) -> dict[str, float]:
+        """Number of two explanations -> half its 95 % interval with all of both free: a share of it, of a nuisance that
+        may be 0 in its own unit; empty where the plan is for something else.
+
+        Raises InsufficientDataError where no log tells them apart.
+        """
+        if len(self.aim.names) < 2:
+            return {}
+        names = [prediction.names[k] for k in self.aim.places(prediction.names, prediction.robot_count)]
+        if any(not np.isfinite(prediction.of(name)) for name in names):
+            cures = [str(blind.how_to_show()) for blind in prediction.blind if set(names) & set(blind.changes)]
+            raise InsufficientDataError(
+                f"no plan tells {self.aim.names[0]} from {self.aim.names[1]} in a log of these channels",
+                got=", ".join(self.noise),
+                expected="another channel, or one of both measured",
+                remedy=cures[0] if cures else "log another channel",
+                where="aim",
+            )
+        return {name: 2.0 * prediction.of(name) for name in names}
 
     def _left_of(self, opening: list[PlannedMove]) -> list[PlannedMove]:
         """What of the opening was not driven yet, or only a little."""
@@ -301,15 +383,25 @@ class _Planner:
         return recorded(robot, share, self.dt, self.noise, rng)
 
 
-def _of(predictions: Prediction, aim: str) -> float:
-    """The score of a whole plan: less is better."""
-    names = (aim,) if aim else predictions.names
-    return float(np.mean([math.log(min(predictions.of(name), UNKNOWN)) for name in names]))
-
-
-def _beside(predictions: Prediction, promised: Mapping[str, float]) -> float:
-    """How far the widest interval is beyond what was promised: less is better."""
-    return max(predictions.of(name) / min(half, UNKNOWN) for name, half in promised.items())
+def _no_plan(width: float, depth: float, left_out: Mapping[str, int], limits: PlanLimits) -> InsufficientDataError:
+    """That there is none, and what stands in its way most."""
+    most = max(left_out, key=lambda why: left_out[why], default=ROOM)
+    if most in PlanLimits._fields:
+        return InsufficientDataError(
+            f"no plan moves the robot visibly within the limit of {most}",
+            got=f"{getattr(limits, most):.3g}",
+            expected="a limit that lets it move",
+            remedy="a higher limit, or a robot that is known better",
+            where="limits",
+        )
+    return InsufficientDataError(
+        "no plan moves the robot visibly and stays inside the room, for all robots that may be meant",
+        got=f"{width:g} m x {depth:g} m",
+        expected="a larger room, or a robot that is known better",
+        remedy="drive it by hand for a minute, slowly and both ways along each axis, and plan for what identify makes "
+        "of that log",
+        where="area",
+    )
 
 
 def _opening(moves: Sequence[TriedMove]) -> list[PlannedMove]:
@@ -331,9 +423,14 @@ def _robots(robot: Robot) -> list[Robot]:
         return list(sample(robot, DRAWS, SEED, factors=dict.fromkeys(keys, GUESS)))
 
 
-def _question(robot: Robot, free: Sequence[str] | None) -> OutputError:
+def _question(robot: Robot, free: Sequence[str] | None, aim: PlanAim) -> OutputError:
+    """What the fit of its log is asked. Of two explanations all numbers are free."""
     keys = None if free is None else tuple(key for name in free for key in map(str, expand(name, robot)))
-    return OutputError(free=keys, nuisances=())
+    if aim.criterion == NEXT:
+        keys = keys or fitted_keys(robot)
+    if len(aim.names) > 1 and aim.keys:
+        keys = tuple(dict.fromkeys((*(keys or friction_keys(robot)), *aim.keys)))
+    return OutputError(free=keys, nuisances=aim.nuisances)
 
 
 def _farthest(run: Run) -> float:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Points, Table, percent_cell, plain
 from omnidyn.identification.output_error.trust.cures import Blind
+from omnidyn.identification.planning.aims import NEXT, PlanAim
+from omnidyn.identification.planning.limits import PlanLimits, strain
 from omnidyn.identification.planning.moves import PlannedMove
 from omnidyn.identification.planning.recorded import driven
 from omnidyn.model.drive import DUTY
@@ -30,11 +33,12 @@ OPEN_SHARE = 0.5  # half an interval, of the number: what is wider is not learnt
 @dataclass(frozen=True)
 class Predicted:
     """value: of a number now. half, worst: of its 95 % interval, as a share of the value: in the middle of the robots
-    drawn, and in the worst of them."""
+    drawn, and in the worst of them. before: the same until now, of a plan for the next drive after a fit."""
 
     value: float
     half: float
     worst: float
+    before: float = math.inf
 
     @property
     def is_learnt(self) -> bool:
@@ -51,7 +55,8 @@ class Plan(Displayable):
     moves: (start [s], move) of the program. area [m], reach [m]: the room, and how far it goes along x and y at most,
     of all robots drawn. predicted: key -> what will be known. noise: channel -> std of what is recorded, of
     wheel_angle the step of a count [rad]. robots: how many were drawn. blind: what no log of these channels shows, and
-    what would.
+    what would. aim: what it is to tell best; apart: of two explanations, number -> half its 95 % interval, as a share
+    of it, of a nuisance in its unit. tried: moves; left_out: why -> of how many; limits: of current, heat, traction.
     """
 
     robot: Robot
@@ -67,6 +72,11 @@ class Plan(Displayable):
     noise: Mapping[str, FloatArray]
     robots: int
     blind: tuple[Blind, ...] = ()
+    aim: PlanAim = field(default_factory=PlanAim)
+    apart: Mapping[str, float] = field(default_factory=dict)
+    tried: int = 0
+    left_out: Mapping[str, int] = field(default_factory=dict)
+    limits: PlanLimits = field(default_factory=PlanLimits)
 
     @property
     def seconds(self) -> float:
@@ -103,6 +113,12 @@ class Plan(Displayable):
             "share": learnt.get(widest),
             "seconds": self.seconds,
         }
+        if self.aim.criterion == NEXT:
+            widest = max(self.predicted, key=lambda name: self.predicted[name].half)
+            before = max(self.predicted, key=lambda name: self.predicted[name].before)
+            numbers |= {"widest": widest, "share": self.predicted[widest].half}
+            numbers |= {"before": before, "known": self.predicted[before].before}
+            return Statement("planned_next", NOTE, self.robot.name, numbers)
         return Statement("planned", WARNING if missing else NOTE, self.robot.name, numbers)
 
     def statements(self) -> list[Statement]:
@@ -114,16 +130,40 @@ class Plan(Displayable):
             Statement(
                 "plan_stays_inside", NOTE, numbers={"reach": self.reach, "area": self.area, "robots": self.robots}
             ),
+            *self._told_apart(),
+            self._strain(),
             Statement("plan_records", NOTE, numbers={"noise": self.noise, "rate": 1.0 / self.dt}),
             *too_fine,
             Statement("plan_begins", NOTE, numbers={"held_out": len(self.held_out) * self.dt}),
             *(one.statement() for one in self.blind),
         ]
 
+    def _told_apart(self) -> list[Statement]:
+        """From what size on two explanations are told apart."""
+        numbers = {"explanations": self.aim.names, "sizes": self.apart}
+        return [Statement("plan_tells_apart", NOTE, numbers=numbers)] if self.apart else []
+
+    def _strain(self) -> Statement:
+        """What it asks of battery, motors and wheels, and which moves were left out for what."""
+        rolling = self.robot.replace(wheels=self.robot.wheels.replace(traction_mu=None))
+        most = strain(rolling, driven(rolling, self.share, self.dt), self.dt)
+        heat = most.energy / (len(self.share) * self.dt)
+        numbers = {"current": most.current, "heat": heat, "traction": most.traction}
+        numbers |= {"tried": self.tried, "left_out": self.left_out, "limits": self.limits._asdict()}
+        return Statement("plan_asks", NOTE, numbers=numbers)
+
     def document(self) -> Document:
         """What it says."""
+        is_next = self.aim.criterion == NEXT
         numbers = [
-            (in_words(name), name, f"{number.value:.4g}", percent_cell(number.half), percent_cell(number.worst))
+            (
+                in_words(name),
+                name,
+                f"{number.value:.4g}",
+                *([percent_cell(number.before)] if is_next else []),
+                percent_cell(number.half),
+                percent_cell(number.worst),
+            )
             for name, number in self.predicted.items()
         ]
         moves = [
@@ -132,7 +172,12 @@ class Plan(Displayable):
         ]
         parts = [
             Points(self.statements()),
-            Table(("number", "key", "now", "95 % +- %", "worst %"), numbers, "<<>>>", name="numbers"),
+            Table(
+                ("number", "key", "now", *(["before +- %"] if is_next else []), "95 % +- %", "worst %"),
+                numbers,
+                "<<>>>>" if is_next else "<<>>>",
+                name="numbers",
+            ),
             Table(("starts s", "direction", "input", "of the largest %", "lasts s"), moves, "><<>>", name="moves"),
         ]
         return Document(parts, as_verdict(self.verdict) | self.to_dict(), verdict=self.verdict)
@@ -149,6 +194,10 @@ class Plan(Displayable):
                 "reach_m": self.reach,
                 "noise": {channel: std.tolist() for channel, std in self.noise.items()},
                 "predicted": {name: vars(number) for name, number in self.predicted.items()},
+                "aim": ",".join(self.aim.names) or self.aim.criterion,
+                "apart": self.apart,
+                "tried": self.tried,
+                "left_out": self.left_out,
                 "moves": [{"start_s": start, **vars(move)} for start, move in self.moves],
             }
         )

@@ -23,6 +23,7 @@ CHANNELS = {
 }  # entries of each; 0: one per wheel
 INPUTS = ("voltage", "duty", "supply")
 FINE = 4  # steps in a row, over which the angle of a wheel adds up
+TOLERANCE = 3e-4  # [m/s] of a run: well below what stands, and what sensors see
 COUNTS = 2048.0  # in a turn of a wheel, where the robot file says nothing
 
 
@@ -60,11 +61,11 @@ def noise_of(robot: Robot, dt: float, given: Mapping[str, object] | None = None)
     return stds
 
 
-def driven(robot: Robot, share: FloatArray, dt: float) -> Run:
+def driven(robot: Robot, share: FloatArray, dt: float, tol: float = TOLERANCE) -> Run:
     """A run from rest under an input given as a share of the largest one, rows of dt [s], shape (rows, wheels)."""
     if robot.drive.kind == DUTY:
-        return simulate(robot, duty=share, supply=robot.drive.supply, dt=dt)
-    return simulate(robot, share * np.asarray(robot.motor.voltage_limit), dt)
+        return simulate(robot, duty=share, supply=robot.drive.supply, dt=dt, tol=tol)
+    return simulate(robot, share * np.asarray(robot.motor.voltage_limit), dt, tol=tol)
 
 
 def recorded(robot: Robot, share: FloatArray, dt: float, noise: Noise, rng: np.random.Generator) -> Run:
