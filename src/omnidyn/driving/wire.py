@@ -62,7 +62,7 @@ def command_of(fields: list[str] | None) -> Command | None:
         inputs = tuple(map(float, fields[5:]))
     except ValueError:
         return None
-    if not all(map(math.isfinite, inputs)):
+    if not all(map(math.isfinite, inputs)) or not (0 <= sent < WRAP and 0 <= hold < WRAP):
         return None
     return Command(session, number, sent / MICROS, hold / MICROS, inputs)
 
@@ -93,6 +93,8 @@ class MeasuredLines:
             return None
         try:
             micros, session, number = map(int, fields[1:4])
+            if not 0 <= micros < WRAP:
+                return None
             cells = {name: float(value) for name, _, value in (cell.partition("=") for cell in fields[4:])}
         except ValueError:
             return None
