@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import omnidyn
+from omnidyn.errors import InputError
 
 ROWS = [[0.0, 0.0, 0.0]] * 20 + [[0.0, 3.0, -3.0]] * 40 + [[0.0] * 3] * 20 + [[0.0, -3.0, 3.0]] * 40 + [[0.0] * 3] * 20
 
@@ -81,9 +82,24 @@ def test_files_are_written(call, here, commands, kind):
         (["rows.csv", "--robot", "lekiwi"], "not what the drive takes"),
         (["rows.csv", "--robot", "axebot", "--hold", "--to", "udp:127.0.0.1:9", "-o", "l.csv"], "no key can be held"),
         (["none.csv", "--robot", "axebot"], "none.csv"),
+        (["rows.csv", "--robot", "axebot", "--plant", "lekiwi"], "not a robot for this plan; got 3 wheels, speed"),
+        (["rows.csv", "--robot", "axebot", "--dead-man", "nan"], "--dead-man: out of range"),
+        (["rows.csv", "--robot", "axebot", "--supply", "nan"], "supply: not a voltage"),
+        (["rows.csv", "--robot", "axebot", "--area", "0x3"], "--area: wrong room"),
     ],
 )
 def test_what_it_does_not_take(call, here, commands, arguments, words):
     code, _, err = call("drive", *arguments)
     assert code == 3
     assert words in err
+
+
+def test_a_key_that_nobody_holds_is_waited_for_no_longer_than_a_minute(monkeypatch):
+    from contextlib import nullcontext
+
+    from omnidyn.cli import drive
+
+    monkeypatch.setattr(drive, "held_key", lambda: nullcontext(lambda: False))
+    monkeypatch.setattr(drive, "KEY_WITHIN", 0.0)
+    with pytest.raises(InputError, match="no key is held"), drive._held(True):
+        pass

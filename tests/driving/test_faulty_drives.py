@@ -8,6 +8,7 @@ from omnidyn import sample
 from omnidyn.driving.clock import SimulatedClock
 from omnidyn.driving.drive import drive
 from omnidyn.driving.guard import Limits
+from omnidyn.driving.program import DriveProgram
 from omnidyn.driving.simulated import FAULTS, Fault, SimulatedRobot
 from tests.support.faulty_drives import DT, axebot_program, driven, random_fault, with_battery
 
@@ -139,3 +140,12 @@ def test_a_broken_line_and_a_hand_stop_keep_the_log():
         clock.sleep_until(clock.now() + 2.0)
         robot.receive()
         assert robot.last_driven - record.stopped_at <= DEAD_MAN
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_noise_of_a_camera_is_no_slip(seed):
+    robot = PROGRAM.robot
+    rows = np.concatenate([np.zeros((60, 3)), 0.4 * PROGRAM.inputs])
+    noise = {"wheel_angle": (2.0 * np.pi / 2048.0,) * 3, "pose": (0.006, 0.006, 0.005)}
+    record = drive(DriveProgram(robot, DT, rows), SimulatedRobot(robot, noise, seed=seed))
+    assert record.stopped is None, record.verdict

@@ -188,3 +188,27 @@ def test_closed_streams_are_said(monkeypatch):
     monkeypatch.setattr(sys, "stdin", None)
     with pytest.raises(InputError, match="standard input or output is closed"):
         senders.sender("-", 3).open()
+
+
+def test_a_stream_without_an_end_is_left_for_the_next_time():
+    lines = Lines(lambda: b"\0" * 1000)
+    assert lines.new() == lines.new() == []
+    pieces = iter([b"one\ntw", b"o\n", b""])
+    assert Lines(lambda: next(pieces)).new() == [b"one", b"two"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a pipe of Windows cannot be asked")
+def test_a_standard_output_that_nobody_reads_is_not_waited_for(monkeypatch):
+    (nothing, source), (reader, target) = os.pipe(), os.pipe()
+    monkeypatch.setattr(sys, "stdin", types.SimpleNamespace(fileno=lambda: nothing))
+    monkeypatch.setattr(sys, "stdout", types.SimpleNamespace(fileno=lambda: target))
+    robot = sender("-", 3)
+    robot.open()
+    try:
+        for _ in range(5000):  # more than a pipe holds
+            robot.send(COMMAND)
+        robot.close()
+        assert os.read(reader, 1 << 20).count(b"\n") < 5000
+    finally:
+        for end in (nothing, source, reader, target):
+            os.close(end)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
 
 SIM, STDOUT = "sim", "-"
+KEY_WITHIN = 60.0  # [s] until a key must be held down
 
 
 def drive(
@@ -122,6 +124,9 @@ def _drive(
     from omnidyn.driving.simulated import SimulatedRobot
 
     limits = Limits(stops[0], stops[0], stops[1])
+    if (truth.wheels.count, truth.drive.kind) != (program.robot.wheels.count, program.robot.drive.kind):
+        got, expected = (f"{one.wheels.count} wheels, {one.drive.kind}" for one in (truth, program.robot))
+        raise InputError("not a robot for this plan", got=got, expected=expected, where="--plant")
     with shown_progress("driving") as progress:
         if to == SIM:
             beside = plan_beside(plan)
@@ -140,8 +145,11 @@ def _held(hold: bool) -> Iterator[Callable[[], bool]]:
         return
     with held_key() as held:
         say("omnidyn: hold a key down to drive; let it go to stop")
+        end = time.monotonic() + KEY_WITHIN
         while not held():
-            pass
+            if time.monotonic() > end:
+                raise InputError("no key is held", got=f"{KEY_WITHIN:g} s without one", expected="a key", where="hold")
+            time.sleep(0.01)
         yield held
 
 

@@ -13,6 +13,7 @@ from omnidyn.driving.guard import DriveGuard, Limits
 from omnidyn.driving.program import DriveProgram
 from omnidyn.driving.record import DriveRecord
 from omnidyn.driving.recording import DriveRecording
+from omnidyn.errors import InputError
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.statement import WARNING, Statement
 
@@ -44,6 +45,8 @@ def drive(
         held: Whether a key that must be held down still is.
         progress: Hears what is done.
 
+    Raises InputError for rows that are longer than half the dead-man time, for which a command acts.
+
     >>> import omnidyn
     >>> robot = omnidyn.load_robot("axebot")
     >>> forward = [[0.0, 3.0, -3.0]] * 50 + [[0.0, 0.0, 0.0]] * 25
@@ -54,9 +57,17 @@ def drive(
     True
     """
     check_order("drive(program, connection)", (program, DriveProgram), (connection, object))
-    return _Driver(
-        program, connection, limits or Limits(), clock or _clock_of(connection), held or (lambda: True), progress
-    ).run()
+    limits = limits or Limits()
+    most = 0.5 * limits.dead_man
+    if program.dt > most:  # the motors would be off before the next row
+        raise InputError(
+            "rows are longer than a command acts",
+            got=f"{program.dt:g} s",
+            expected=f"at most {most:g} s, half the dead-man time",
+            remedy="take shorter rows, or a longer `dead_man`",
+            where="program",
+        )
+    return _Driver(program, connection, limits, clock or _clock_of(connection), held or (lambda: True), progress).run()
 
 
 def _clock_of(connection: object) -> DriveClock:
@@ -139,7 +150,7 @@ class _Driver:
                 return stopped
             self._send(tuple(row))
             self.rows, due = k + 1, self.start + (k + 1) * dt
-            if k % round(1.0 / dt) == 0:
+            if k % max(round(1.0 / dt), 1) == 0:
                 self.progress(Report("driving", k, len(inputs)))
         return None
 

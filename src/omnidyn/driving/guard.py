@@ -7,18 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from omnidyn.arguments import is_number
 from omnidyn.arrays import FloatArray
 from omnidyn.driving.connection import Measured
 from omnidyn.driving.odometry import Odometry
 from omnidyn.driving.program import DriveProgram
+from omnidyn.errors import InputError
 from omnidyn.statement import WARNING, Statement
 
 WINDOW = 0.3  # [s] of travel that is compared
 FOLLOWS_WITHIN = 0.2  # [s] later than predicted, at the latest
 MOVING = 0.25  # of the longest travel of a wheel in a window of the program: less is not judged
 FOLLOWS = 0.2  # of the predicted travel: a wheel that turns less does not follow
+SLIPS_FOR = 0.15  # [s]: a slip that ends sooner is noise of a sensor
 SLIPS = 0.5  # of the travel: by so much wheels and body may differ
 LEAST_SUPPLY = 0.75  # of the supply in the robot file
+DEAD_MAN_RANGE = (0.02, 10.0)  # [s]
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,15 @@ class Limits:
     dead_man: float = 0.25
     silence: float = 0.25
     supply: float | None = None
+
+    def __post_init__(self) -> None:
+        least, most = DEAD_MAN_RANGE
+        for name in ("dead_man", "silence"):
+            value = getattr(self, name)
+            if not is_number(value) or not least <= value <= most:
+                raise InputError("out of range", got=value, expected=f"{least:g} to {most:g} s", where=name)
+        if self.supply is not None and (not is_number(self.supply) or not 0.0 <= self.supply < np.inf):
+            raise InputError("not a voltage", got=self.supply, expected="volts, 0 or more", where="supply")
 
 
 class DriveGuard:
@@ -49,12 +62,14 @@ class DriveGuard:
         self._unanswered = deque[tuple[int, float]]()
         self._travel = {"encoders": _Travel(), "body": _Travel()}
         speed = np.asarray(program.predicted.wheel_speed)
+        self._slips_since = np.full(program.robot.wheels.count, np.inf)  # time of each wheel [s]
         self._predicted = np.zeros_like(speed)
         np.cumsum(0.5 * program.dt * (speed[1:] + speed[:-1]), axis=0, out=self._predicted[1:])
         self._back = max(round(WINDOW / program.dt), 1)
         self._judged = MOVING * np.abs(self._way(np.arange(len(speed)))).max(axis=0)
         supply = program.robot.drive.supply
-        self._least_supply = limits.supply or (LEAST_SUPPLY * supply if supply else 0.0)
+        of_file = LEAST_SUPPLY * supply if supply else 0.0
+        self._least_supply = of_file if limits.supply is None else limits.supply
 
     def sent(self, now: float, number: int) -> None:
         """A command was sent."""
@@ -113,7 +128,10 @@ class DriveGuard:
         if len(went) == 2:
             apart = np.abs(went["encoders"] - went["body"])
             far = np.maximum(np.abs(went["encoders"]), np.abs(went["body"]))
-            slips = np.flatnonzero(apart > SLIPS * np.maximum(far, 2.0 * self._judged))
+            slips = apart > SLIPS * np.maximum(far, 2.0 * self._judged)
+            time = self._travel["body"].time
+            self._slips_since = np.where(slips, np.minimum(self._slips_since, time), np.inf)
+            slips = np.flatnonzero(time - self._slips_since >= SLIPS_FOR)
             if slips.size:
                 return _stop("drive_slip", wheel=int(slips[0]) + 1)
         turned = next(iter(went.values()))

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from omnidyn.arguments import is_number
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Table
 from omnidyn.errors import InputError
@@ -29,6 +30,8 @@ CHANNELS = {DUTY: "duty", SPEED: "wheel_speed_command"}  # kind of drive -> chan
 UNITS = {"voltage": "V", "duty": "duty", "wheel_speed_command": "rad/s"}
 STILL = (0.005, np.radians(1.0))  # [m], [rad]: less is no way
 BACK = 0.2  # of its farthest way: a leg that comes back by more says so
+ROUNDING = 1e-9  # of a duty
+LARGEST = 1000.0  # [m] of a side of a room
 TURN_ONLY = 0.1  # [m] a rad: less way beside a turn is not named
 
 
@@ -81,6 +84,15 @@ class DriveProgram(Displayable):
         if rows.ndim != 2 or not len(rows) or rows.shape[1] != wheels or not np.isfinite(rows).all():
             raise InputError("wrong rows", got=rows.shape, expected=f"numbers, shape (rows, {wheels})", where="inputs")
         object.__setattr__(self, "inputs", rows)
+        if not is_number(self.dt) or not 0.0 < self.dt < np.inf:
+            raise InputError("wrong length of a row", got=self.dt, expected="seconds above 0", where="dt")
+        if len(self.area) != 2 or not all(is_number(size) and 0.0 < size <= LARGEST for size in self.area):
+            raise InputError("wrong room", got=self.area, expected=f"two sizes, above 0 to {LARGEST:g} m", where="area")
+        if not rows.any():
+            raise InputError("nothing to drive", got="all inputs are 0", expected="a row that moves", where="inputs")
+        if self.channel == "duty" and np.abs(rows).max() > 1.0 + ROUNDING:
+            largest = f"{np.abs(rows).max():g}"
+            raise InputError("a duty beyond the supply", got=largest, expected="-1 to 1", where="inputs")
 
     @property
     def channel(self) -> str:

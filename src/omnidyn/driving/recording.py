@@ -53,7 +53,7 @@ class DriveRecording:
         for name in dict.fromkeys(name for _, one in found for name in one.channels):
             values = [(tick, one.channels[name]) for tick, one in found if name in one.channels]
             rows[name] = _column(name, values, ticks)
-        if channel == "duty" and "supply" in rows:
+        if channel == "duty" and np.isfinite(rows.get("supply", np.nan)).any():
             rows["supply"] = _held(rows["supply"])
         return Run(t=ticks * TICK, source=source, **rows)
 

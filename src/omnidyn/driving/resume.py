@@ -42,6 +42,8 @@ def rest_of(
             remedy="fit what is recorded with identify",
             where="resume",
         )
+    if not len(driven):
+        return program
     if plan is None:
         return program.from_leg(next(k for k, leg in enumerate(program.legs) if leg.end > len(driven)))
     limit = np.asarray(plan.limit)
@@ -69,6 +71,13 @@ def driven_rows(program: DriveProgram, run: Run) -> FloatArray:
             where="resume",
         )
     complete = np.flatnonzero(np.isfinite(inputs).all(axis=1))
+    if not complete.size:
+        raise InputError(
+            "a log without inputs",
+            got=f"no row with {program.channel} of all wheels",
+            expected=f"{program.channel} of {program.robot.wheels.count} wheels",
+            where="resume",
+        )
     t, inputs = run.t[complete] - run.t[complete[0]], inputs[complete]
     rows = np.arange(round(t[-1] / program.dt)) * program.dt
     return inputs[np.searchsorted(t, rows + 1e-6, side="right") - 1]

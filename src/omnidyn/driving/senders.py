@@ -10,12 +10,11 @@ from collections.abc import Callable
 from typing import Any
 
 from omnidyn.driving.connection import Command, Measured
-from omnidyn.driving.wire import Lines, MeasuredLines, body, command_line, stop_line
+from omnidyn.driving.wire import MOST_BYTES, Lines, MeasuredLines, body, command_line, stop_line
 from omnidyn.errors import InputError, MissingExtraError
 
 STDOUT, UDP, SERIAL = "-", "udp:", "serial:"
 BAUD = 115200
-MOST_BYTES = 1 << 16
 
 
 class LineConnection:
@@ -101,7 +100,11 @@ def _open_streams() -> tuple[Callable[[], bytes], Callable[[bytes], Any], Callab
     def read() -> bytes:
         return os.read(source, MOST_BYTES) if select.select([source], [], [], 0.0)[0] else b""
 
-    return read, lambda data: os.write(target, data), lambda: None
+    def write(data: bytes) -> None:
+        if select.select([], [target], [], 0.0)[1]:  # else nobody reads: the guard sees what comes of it
+            os.write(target, data)
+
+    return read, write, lambda: None
 
 
 def _open_udp(host: str, port: int) -> tuple[Callable[[], bytes], Callable[[bytes], Any], Callable[[], Any]]:

@@ -23,6 +23,7 @@ from omnidyn.sensors import CHANNELS, WHEEL
 
 MICROS, WRAP = 1e6, 1 << 32
 LONGEST = 2000  # characters of a line
+MOST_BYTES = 1 << 16  # that are read at once: a stream without an end is left for the next time
 COMMAND, STOP, MEASURED = "C", "S", "M"
 
 
@@ -62,7 +63,7 @@ def command_of(fields: list[str] | None) -> Command | None:
         inputs = tuple(map(float, fields[5:]))
     except ValueError:
         return None
-    if not all(map(math.isfinite, inputs)):
+    if not all(map(math.isfinite, inputs)) or not (0 <= sent < WRAP and 0 <= hold < WRAP):
         return None
     return Command(session, number, sent / MICROS, hold / MICROS, inputs)
 
@@ -93,6 +94,8 @@ class MeasuredLines:
             return None
         try:
             micros, session, number = map(int, fields[1:4])
+            if not 0 <= micros < WRAP:
+                return None
             cells = {name: float(value) for name, _, value in (cell.partition("=") for cell in fields[4:])}
         except ValueError:
             return None
@@ -115,11 +118,13 @@ class Lines:
 
     def new(self) -> list[bytes]:
         """Those that are complete by now."""
-        while data := self._read():
-            self._rest += data
-        *lines, self._rest = self._rest.split(b"\n")
-        self._rest = self._rest[-LONGEST:]
-        return lines
+        complete, read = list[bytes](), 0
+        while read < MOST_BYTES and (data := self._read()):
+            read += len(data)
+            *lines, rest = (self._rest + data).split(b"\n")
+            complete += lines
+            self._rest = rest[-LONGEST:]
+        return complete
 
 
 def _micros(seconds: float) -> int:

@@ -83,6 +83,34 @@ def test_a_twist_of_all_axes_is_no_gyroscope():
     assert not has_gyroscope(whole)
 
 
+def a_gap(omega, rng):
+    omega[200:320] = np.nan
+    return omega
+
+
+def spikes(omega, rng):
+    omega[rng.random(len(omega)) < 0.01] = 30.0
+    return omega
+
+
+def late(omega, rng):
+    return np.append(np.full(4, omega[0]), omega[:-4])
+
+
+def held(omega, rng):
+    return np.repeat(omega[::2], 2)[: len(omega)]
+
+
+@pytest.mark.parametrize("change", [a_gap, spikes, late, held])
+def test_gaps_spikes_lateness_and_held_samples_are_no_bias_and_no_less_noise(change):
+    log = log_with_gyroscope("counts")
+    assert log.twist is not None
+    omega = change(log.twist[:, 2].copy(), np.random.default_rng(4))
+    shown = _gyroscope([replace(log, twist=as_twist(omega))], AXEBOT.wheels)
+    assert 0.8 * NOISE < shown["gyro_noise"] < 2.0 * NOISE  # with what the motion of this robot leaves of it
+    assert shown["gyro_bias"] == pytest.approx(BIAS, rel=0.3)
+
+
 def camera_log(is_staggered: bool):
     """10 s of noisy poses: in every third row of a logger beside speeds, or in rows of their own, 1 us behind those."""
     rng, count = np.random.default_rng(2), 1000

@@ -1,10 +1,13 @@
 """Random effects by draws and dense matrices: rows made white, what is predicted and how far that is open, how much of
 their variance there is."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from omnidyn.identification.output_error.linear.random_effects import RandomEffects, scaled
+from omnidyn.identification.output_error.linear.rows import Linear
 
 RANDOM = np.random.default_rng(3)
 Z = RANDOM.normal(size=(40, 7)) * np.geomspace(1e-3, 4.0, 7)
@@ -21,6 +24,13 @@ def test_effects_are_predicted_as_their_mean_beside_noise():
     effects = RandomEffects.of(Z / 2.0, 2.0)
     assert effects.predicted(values) / 2.0 == pytest.approx(Z.T @ np.linalg.solve(covariance, values))
     assert effects.open @ effects.open.T / 4.0 == pytest.approx(np.eye(7) - Z.T @ np.linalg.solve(covariance, Z))
+
+
+def test_a_piece_without_rounded_inputs_beside_one_with_them_leaves_nothing_open():
+    """A piece in which the robot only stands: of nothing was anything rounded off."""
+    shown, effects = [np.zeros((2, 20, 0)), Z.reshape(2, 20, 7)], [RandomEffects.of(Z[:, :0]), RandomEffects.of(Z)]
+    linear = SimpleNamespace(rows=SimpleNamespace(rounding=shown), rounding=effects)
+    assert [Linear.open(linear, k).shape for k in range(2)] == [(2, 20, 0), (2, 20, 7)]
 
 
 @pytest.mark.parametrize("true", [0.0, 0.4, 1.0])

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.clocks import usual_step
 from omnidyn.errors import InputError
 from omnidyn.identification.output_error.problem.record import Record
@@ -22,6 +22,10 @@ LONGEST_STEP = 3.5  # usual steps from one pose to the next: what is longer is a
 THIRD_OF_NOISE = np.sqrt(20.0)
 LEAST_GYRO_NOISE = 1e-6  # [rad/s] std: omega with less is of a simulation
 CLEARLY = 1.25  # times the square of the bias: what a fit leaves of omega beyond that is noise
+SPIKE = 8.0  # times the robust std of omega about the median of its neighbours: no noise of a gyroscope
+AROUND = 5  # samples whose median is what a spike stands out of
+LATENESS = np.arange(-5, 16)  # rows by which a gyroscope may be later than the heading
+HELD_SHARE = 0.05  # of the values of a gyroscope that may last shorter than others, if each is held for several rows
 MOST_ALIKE = 0.98  # correlation of the heading with the time, beyond which a bias is a slightly other size of the robot
 
 
@@ -102,8 +106,9 @@ def _gyroscope(runs: Sequence[Run], wheels: Wheels, left: float | None = None) -
     for run in runs:
         if has_gyroscope(run):
             t, twist = run.samples("twist")
-            thirds.append(np.diff(twist[:, 2], n=3))
-            biases += _bias(t, twist[:, 2], run, wheels)
+            omega = twist[:, 2]
+            thirds.append(np.diff(omega[_is_sample(omega)], n=3))
+            biases += _bias(t, _without_spikes(omega), run, wheels)
     if sum(map(len, thirds)) < LEAST_POSES:
         return {}
     noise = float(robust_std(np.concatenate(thirds))) / THIRD_OF_NOISE
@@ -115,21 +120,56 @@ def _gyroscope(runs: Sequence[Run], wheels: Wheels, left: float | None = None) -
     return {"gyro_noise": noise} | ({"gyro_bias": float(np.sqrt(bias_square))} if biases else {})
 
 
+def _is_sample(omega: FloatArray) -> BoolArray:
+    """Which rows show a new sample: those where omega changes, if it is held for two rows or more; else all."""
+    is_new = np.append(True, np.diff(omega) != 0.0)[: len(omega)]
+    lasts = np.diff(np.flatnonzero(is_new))
+    is_held = len(lasts) >= LEAST_POSES and np.quantile(lasts, HELD_SHARE) >= 2.0
+    return np.asarray(is_new if is_held else np.ones(len(omega), bool))
+
+
+def _without_spikes(omega: FloatArray) -> FloatArray:
+    """Omega, with what stands out of the median of its neighbours put on the line between those."""
+    if len(omega) < AROUND:
+        return omega
+    padded = np.pad(omega, AROUND // 2, mode="edge")
+    apart = omega - np.median(np.lib.stride_tricks.sliding_window_view(padded, AROUND), axis=1)
+    std = float(robust_std(apart[apart != 0.0])) if (apart != 0.0).any() else 0.0
+    usual = np.flatnonzero(np.abs(apart) <= SPIKE * std)
+    return np.asarray(np.interp(np.arange(len(omega)), usual, omega[usual]))
+
+
 def _bias(t: FloatArray, omega: FloatArray, run: Run, wheels: Wheels) -> list[float]:
     """By how much omega of a gyroscope is off [rad/s]; empty where nothing else tells the heading, or not apart.
 
     Added up, it is the heading by wheels or poses, times a share that may be off as the size of the robot may, and the
-    bias times the time.
+    bias times the time, and less what it is late by times omega. After a gap the sum starts anew.
     """
     heading_by_time = _heading(run, wheels)
     if heading_by_time is None:
         return []
-    turned = np.append(0.0, np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t)))
-    since, heading = t - t[0], np.interp(t, *heading_by_time)
-    if np.std(heading) > 0.0 and abs(np.corrcoef(since, heading)[0, 1]) > MOST_ALIKE:
-        return []
-    columns = np.column_stack([since, heading, np.ones(len(t))])
-    return [float(np.linalg.lstsq(columns, turned)[0][0])]
+    steps = np.diff(t)
+    is_gap = steps > LONGEST_STEP * np.median(steps)
+    turned = np.append(0.0, np.cumsum(np.where(is_gap, 0.0, 0.5 * (omega[1:] + omega[:-1]) * steps)))
+    part = np.append(0, np.cumsum(is_gap))
+    turned = _without_means(turned, part)
+    best = (np.inf, 0.0, 0.0)  # (mean square of what remains, bias, correlation of the heading with the time)
+    for lateness in np.median(steps) * LATENESS:
+        heading = np.interp(t - lateness, *heading_by_time)
+        columns = _without_means(np.column_stack([t, heading, omega]), part)
+        size = float(np.linalg.norm(columns[:, 0]) * np.linalg.norm(columns[:, 1]))
+        alike = abs(float(columns[:, 0] @ columns[:, 1])) / size if size > 0.0 else 0.0
+        numbers = np.linalg.lstsq(columns, turned)[0]
+        best = min(best, (float(np.mean(np.square(turned - columns @ numbers))), float(numbers[0]), alike))
+    return [best[1]] if best[2] <= MOST_ALIKE else []
+
+
+def _without_means(values: FloatArray, part: IntArray) -> FloatArray:
+    """Values less their mean over each part of the log."""
+    less = values.copy()
+    for number in range(int(part[-1]) + 1):
+        less[part == number] -= values[part == number].mean(axis=0)
+    return less
 
 
 def _heading(run: Run, wheels: Wheels) -> tuple[FloatArray, FloatArray] | None:

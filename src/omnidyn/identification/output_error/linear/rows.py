@@ -271,7 +271,7 @@ class Linear:
     def open(self, k: int) -> FloatArray:
         """What that may be off by, (C, rows, M) of variance 1 each; of many, as few as MOST_NUMBERS leaves room for."""
         rounding_columns, root = self.rows.rounding[k], self.rounding[k].open
-        column_limit = max(MOST_NUMBERS // max(rounding_columns[:, :, 0].size, 1), LEAST_COLUMNS)
+        column_limit = max(MOST_NUMBERS // max(int(np.prod(rounding_columns.shape[:2])), 1), LEAST_COLUMNS)
         return rounding_columns @ (root if root.shape[1] <= column_limit else drawn_together(root, column_limit))
 
     def degrees_along(self, columns_by_piece: Shown) -> FloatArray:
