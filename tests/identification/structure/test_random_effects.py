@@ -2,6 +2,7 @@
 their variance there is."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ def test_effects_are_predicted_as_their_mean_beside_noise():
 def test_a_piece_without_rounded_inputs_beside_one_with_them_leaves_nothing_open():
     """A piece in which the robot only stands: of nothing was anything rounded off."""
     shown, effects = [np.zeros((2, 20, 0)), Z.reshape(2, 20, 7)], [RandomEffects.of(Z[:, :0]), RandomEffects.of(Z)]
-    linear = SimpleNamespace(rows=SimpleNamespace(rounding=shown), rounding=effects)
+    linear: Any = SimpleNamespace(rows=SimpleNamespace(rounding=shown), rounding=effects)
     assert [Linear.open(linear, k).shape for k in range(2)] == [(2, 20, 0), (2, 20, 7)]
 
 
