@@ -18,7 +18,6 @@ from omnidyn.cli.terminal.streams import say, to_json
 from omnidyn.cli.terminal.telling import as_json, tell
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
-from omnidyn.model.robot_file import robot_to_toml
 
 if TYPE_CHECKING:
     from omnidyn.document import Document
@@ -118,6 +117,8 @@ def plan(
         for path, held_out in zip(files, (False, True), strict=False):
             _write(made, held_out, path, force)
         check = sha256(Path(files[1]).read_bytes()).hexdigest()
+        from omnidyn.model.robot_file import robot_to_toml
+
         _promise(made.document(), source, out, force, check_sha256=check, robot_file=robot_to_toml(loaded))
     tell(made.document(), json, provenance([source]), output=out or None)
     if picture:

@@ -4,7 +4,7 @@ Who writes one for a robot of another kind must keep to this; `SimulatedRobot` i
 
 1. `send` and `receive` return at once, and raise OSError where the line is broken.
 2. A command acts for `hold` seconds after it was sent, measured by the robot's own clock, and no longer: then the
-   motors are off. `DeadMan` is that rule, for Python; the C of `omnidyn drive --to arduino` has it too.
+   motors are off. `DeadMan` is that rule, for Python; the C that `omnidyn drive` writes for Arduino has it too.
 3. A command whose number is not above the last one is dropped, and one of another session unless its number is 0.
    Commands of number 0 move nothing: they begin a session.
 4. What is measured says the number of the last command that was taken.

@@ -10,7 +10,7 @@ from omnidyn.export.spelling import c_comment, filled
 
 NOTES = (
     "fill in four functions at the top of the sketch: motor, angle, supply and held",
-    "OMNIDYN_BY_LINE 1: the board takes commands of `omnidyn drive --to serial:PORT`; 0: it drives the table by "
+    "OMNIDYN_BY_LINE 1: the board takes commands of `omnidyn drive` (`to` serial:PORT); 0: it drives the table by "
     "itself, and prints the log",
 )
 

@@ -34,7 +34,7 @@ def ros2(program: DriveProgram) -> Export:
         f"    colcon build --packages-select {name}\n    ros2 run {name} omnidyn_drive.py",
         "It drives only while something is published on `/hold` (std_msgs/Empty) at least five times a second: "
         "`ros2 topic pub -r 20 /hold std_msgs/msg/Empty`, and Ctrl-C to stop. A stop is for good: write the rest with "
-        "`omnidyn drive --resume` and start that.",
+        "`omnidyn drive` (`resume` LOG) and start that.",
         f"It takes `/joint_states`, and `/battery_state` where there is one, and publishes `/{topic}` "
         f"(std_msgs/Float64MultiArray), a number for each wheel in {program.unit}, in the order {joints}. It writes "
         "`omnidyn-log.csv` where it runs: give that to `omnidyn identify`.",

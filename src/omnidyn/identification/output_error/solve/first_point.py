@@ -27,6 +27,7 @@ MANY_ROWS = 100_000  # rows to which a long log is first fitted
 FEW_ROWS = 1500  # the same for the implicit engine
 LATENCIES = 500  # steps for their median
 LATENCY_STEPS = 12  # of a fit, by which two starts are told apart
+CLEARLY = 3.0  # of a log-likelihood: more than two ways to the same minimum differ by
 FRICTION_SHARES = (0.3, 0.1, 0.03)  # shares of its friction with which a robot may move as the log does
 BIAS = 1e-2  # of that squared distance, per row: what a step a row is off by does not shrink with the rows
 
@@ -51,7 +52,8 @@ def first_point(solver: Solver, records: Sequence[Record]) -> State:
 
 
 def _by_latencies(solver: Solver, start_state: State) -> State:
-    """The state with the best of a few latencies, or with those of the start, whichever comes nearer in a few steps.
+    """The state with the best of a few latencies, or what comes of those of the start where that is clearly nearer in a
+    few steps.
 
     Where the numbers are far off, the latency that comes nearest makes up for them: a minimum of its own, which no
     descent leaves.
@@ -60,8 +62,8 @@ def _by_latencies(solver: Solver, start_state: State) -> State:
     if np.array_equal(late_state.point.values, start_state.point.values):
         return start_state
     plain = Solver(solver.problem, solver.engine, solver.nu, counts_ticks=False)
-    ends = [plain.minimise(state.point, LATENCY_STEPS).state for state in (late_state, start_state)]
-    return solver.state(min(ends, key=lambda state: state.objective).point)
+    late_end, start_end = (plain.minimise(state.point, LATENCY_STEPS).state for state in (late_state, start_state))
+    return solver.state(start_end.point) if start_end.objective < late_end.objective - CLEARLY else late_state
 
 
 def _with_latencies(solver: Solver, start_state: State) -> State:
