@@ -162,6 +162,9 @@ def test_the_words_of_the_library_have_the_names_of_the_page():
     told = each_text({"text": said, "columns": [{"column": "`hold_out`"}]}, in_page_names, str)
     assert told["columns"] == [{"column": "`hold_out`"}]
     assert "`" not in told["text"]
+    remedy = {"key": "motor.resistance_ohm", "text": "motor.resistance_ohm would explain it"}
+    told = each_text({"remedies": [remedy]}, in_page_names, str)["remedies"]
+    assert told == [{"key": "motor.resistance_ohm", "text": "resistance would explain it"}]  # the button fits the key
     for name in ("latency.csv", "latency.twist.csv", "twist[1].csv"):  # a file of a user stays as it is
         assert in_page_names(f"{name}: 3 rows") == f"{name}: 3 rows"
     assert in_page_names("latency.twist is 0; twist[1] is not followed; so is latency.heading.") == (
