@@ -72,7 +72,9 @@ def drive(
     program = read_program(plan, omnidyn.load_robot(robot) if robot else None, _sizes(area) if area else None)
     inputs = [input_file("plan", plan), *([robot_input(robot)] if robot else [])]
     if resume:
-        program = _rest(program, plan, resume)
+        from omnidyn.driving.resume import rest_of
+
+        program = rest_of(program, [omnidyn.read_log(path, robot=program.robot) for path in resume])
         inputs += [input_file("log", path) for path in resume]
     record = provenance(inputs)
     if dry_run:
@@ -101,16 +103,6 @@ def drive(
         )
     if not driven.is_complete:
         end_failed(driven.verdict)
-
-
-def _rest(program: DriveProgram, plan: str, logs: list[str]) -> DriveProgram:
-    """What is left of a plan, after the drives of these logs."""
-    from omnidyn.driving.program_file import plan_beside
-    from omnidyn.driving.resume import rest_of
-
-    runs = [omnidyn.read_log(path, robot=program.robot) for path in logs]
-    with shown_progress("planning the rest") as progress:
-        return rest_of(program, runs, plan_beside(plan), progress)
 
 
 def _drive(

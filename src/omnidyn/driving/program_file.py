@@ -15,12 +15,9 @@ from omnidyn.arrays import FloatArray
 from omnidyn.driving.program import CHANNELS, DriveProgram
 from omnidyn.errors import InputError
 from omnidyn.files import MAX_TEXT_BYTES, read_bytes
-from omnidyn.identification.planning.got import read_plan
 from omnidyn.logs.command_file import read_commands
-from omnidyn.model.drive import DUTY
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import parse_robot
-from omnidyn.model.wheels import per_wheel
 
 CHECK = "-check"  # behind the name of the second program of a plan
 SAME_STEP = 1e-6  # of a row: rows that differ less are equally long
@@ -30,21 +27,12 @@ class PlanFile(NamedTuple):
     """What `omnidyn plan` wrote beside its programs.
 
     robot: it is made for. area: of its room [m]. noise: channel -> std of what is logged. hashes: of both programs.
-    promised: key -> half the interval of each number that was asked for, as a share of it; infinite where it is open.
     """
 
     robot: Robot
     area: tuple[float, float]
     noise: Mapping[str, FloatArray]
     hashes: tuple[str, ...]
-    promised: Mapping[str, float]
-
-    @property
-    def limit(self) -> FloatArray:
-        """The largest input of each wheel, of which a plan takes shares."""
-        if self.robot.drive.kind == DUTY:
-            return np.ones(self.robot.wheels.count)
-        return per_wheel(self.robot.motor.voltage_limit, self.robot.wheels.count)
 
 
 def read_program(
@@ -107,8 +95,7 @@ def plan_beside(path: str | os.PathLike[str]) -> PlanFile | None:
         hashes = tuple(str(document[name]) for name in ("program_sha256", "check_sha256") if name in document)
         noise = {str(name): np.array([_number(std) for std in stds]) for name, stds in document["noise"].items()}
         width, depth = map(_number, document["area_m"])
-        promised = {name: half for name, (half, _) in read_plan(place).items()}
-        return PlanFile(robot, (width, depth), noise, hashes, promised)
+        return PlanFile(robot, (width, depth), noise, hashes)
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         if isinstance(error, InputError):
             raise

@@ -32,8 +32,7 @@ from omnidyn.simulation.batch.sample import sample
 DRAWS, GUESS = 10, (0.7, 1.3)  # robots that may be meant; share of a number of which nothing is known
 ROOM_SHARE = 0.8  # of the way to the border: what a plan uses of it
 HELD_OUT_SHARE = 0.15  # of the time: a second program, to judge the fit by
-SEARCHES, SEARCHES_OF_REST = 8, 24  # plans that are compared whole
-BEGUN_SHARE = 0.6  # of a ramp: one that was driven so far is not begun anew
+SEARCHES = 8  # plans that are compared whole
 KEPT = 0.6  # of the moves: what each of them may choose from
 SMALLER = 0.8  # of the reach of a move, where a whole plan left the room
 ATTEMPTS = 4  # at a plan that stays inside
@@ -108,35 +107,6 @@ def plan(
     return replace(planner, aim=goal).planned((width, depth), seconds, progress)
 
 
-def plan_rest(
-    robot: Robot,
-    driven: FloatArray,
-    seconds: float,
-    area: Sequence[float] = (3.0, 3.0),
-    *,
-    promised: Mapping[str, float],
-    noise: Mapping[str, Any] | None = None,
-    rate: float = 100.0,
-    progress: Progress = silent,
-) -> Plan:
-    """The rest of a plan whose drive was ended: what was driven counts, and what is left of the time is planned anew.
-
-    Args:
-        robot: As for `plan`.
-        driven: The input of what was driven and recorded, in rows of the plan, as share of the largest input.
-            Shape (rows, wheels).
-        seconds: That are left [s], for the program alone.
-        promised: Key -> half of the interval that the plan promised, as a share; all of them are to be reached.
-        area, noise, rate, progress: As for `plan`.
-
-    What it promises is for the logs of both drives together. Raises as `plan`.
-    """
-    width, depth = _room(area)
-    planner = _planner(robot, 1.0 / rate, noise, _question(robot, tuple(promised), PlanAim()), {})
-    planner = replace(planner, driven=driven, promised=promised)
-    return planner.that_tells().planned((width, depth), seconds / (1.0 - HELD_OUT_SHARE), progress)
-
-
 def _planner(
     robot: Robot, dt: float, noise: Mapping[str, Any] | None, question: OutputError, limits: Mapping[str, float]
 ) -> _Planner:
@@ -168,8 +138,6 @@ class _Planner:
     limits: PlanLimits
     rolling: Robot
     aim: PlanAim = field(default_factory=PlanAim)
-    driven: FloatArray | None = None  # and recorded already, as share of the largest input
-    promised: Mapping[str, float] = field(default_factory=dict)  # half the interval of each number, as a share of it
 
     def planned(self, area: tuple[float, float], seconds: float, progress: Progress) -> Plan:
         """A plan that stays inside the room, in so many seconds with the part that is held out."""
@@ -192,16 +160,6 @@ class _Planner:
             border *= SMALLER
         raise _no_plan(width, depth, left_out, self.limits)
 
-    def that_tells(self) -> _Planner:
-        """The same without what was driven, where that tells nothing: it had hardly begun."""
-        if self.driven is None:
-            return self
-        try:
-            told_by([self._recorded(self.robot, self.driven, np.random.default_rng(SEED))], self.robot, self.question)
-        except InsufficientDataError:
-            return replace(self, driven=None)
-        return self
-
     def tried(self) -> list[TriedMove]:
         """All moves, of the robot of the file, and of those that go farthest and least far."""
         slips = self.rolling.wheels.traction_mu is not None
@@ -213,7 +171,7 @@ class _Planner:
 
     def search(self, moves: Sequence[TriedMove], seconds: float, progress: Progress) -> _Programs:
         """The best of a few plans from these moves, each from a part of them, compared whole."""
-        opening = self._left_of(_opening(moves))
+        opening = _opening(moves)
         candidates = [one.move for one in moves]
         rng = np.random.default_rng(SEED)
         runs = [self._recorded(self.rolling, move.both(self.robot, self.dt), rng) for move in candidates]
@@ -222,27 +180,21 @@ class _Planner:
         earlier = self._known(names)
         score = self.aim.score(self.aim.places(names, sum(find_key(name) is not None for name in names)))
         begun = earlier + information[[candidates.index(move) for move in opening]].sum(axis=0)
-        if self.driven is not None:
-            shown_names, more = information_of([self._recorded(self.rolling, self.driven, rng)], self.rolling, asked)
-            places = [names.index(name) for name in shown_names]  # a short drive tells nothing of some
-            begun[np.ix_(places, places)] += more[0]
         time = (1.0 - HELD_OUT_SHARE) * seconds - REST - sum(move.duration for move in opening)
         best, best_score = None, math.inf
         turn = self._quarter_turn(candidates) if {TILT, PUSH} <= set(self.aim.nuisances) else None
         time -= 2.0 * turn.duration if turn else 0.0
         # what is best by the volume is often good for another aim: it is compared too
         scores = list(dict.fromkeys((score, VOLUME) if self.aim != PlanAim() else (score,)))
-        count = SEARCHES_OF_REST if self.promised else SEARCHES
-        question = self.question if self.promised else asked  # a promise is without doubts
-        for k in range(count):
-            progress(Report("choosing moves", k, count))
+        for k in range(SEARCHES):
+            progress(Report("choosing moves", k, SEARCHES))
             kept = np.flatnonzero(rng.random(len(candidates)) < KEPT) if k else np.arange(len(candidates))
             for by in scores:
                 some = [candidates[j] for j in kept]
                 order = [int(kept[i]) for i in chosen(some, information[kept], time, by, begun)]
                 made = self._programs(opening, [candidates[j] for j in order], seconds, turn)
-                logs = self._logs(self.robot, made.share, np.random.default_rng(SEED))
-                of_plan = self._score(told_by(logs, self.robot, question, is_coarse=True))
+                log = self._recorded(self.robot, made.share, np.random.default_rng(SEED))
+                of_plan = self._score(told_by([log], self.robot, asked, is_coarse=True))
                 if best is None or of_plan < best_score:
                     best, best_score = made, of_plan
         assert best is not None
@@ -259,9 +211,7 @@ class _Planner:
         return prediction.beside(self._known(prediction.names[: prediction.robot_count]))
 
     def _score(self, prediction: Prediction) -> float:
-        """That of a whole plan: less is better. Of a promise, how far the widest interval is beyond it."""
-        if self.promised:
-            return max(prediction.of(name) / min(half, UNKNOWN) for name, half in self.promised.items())
+        """That of a whole plan: less is better."""
         after = self._beside(prediction)
         places = self.aim.places(after.names, after.robot_count)
         return self.aim.of_std(np.array([min(after.of(after.names[k]), UNKNOWN) for k in places]))
@@ -311,9 +261,10 @@ class _Planner:
         """The plan, with what the fit would say of its log for each robot that may be meant."""
         rng = np.random.default_rng(SEED)
         predictions = [
-            self._beside(told_by(self._logs(robot, made.share, rng), robot, self.question)) for robot in self.robots
+            self._beside(told_by([self._recorded(robot, made.share, rng)], robot, self.question))
+            for robot in self.robots
         ]
-        values = told_by(self._logs(self.robot, made.share, rng), self.robot, self.question, cures=True)
+        values = told_by([self._recorded(self.robot, made.share, rng)], self.robot, self.question, cures=True)
         apart = self._apart(values)
         names = values.names[: values.robot_count]
         halves = {name: 2.0 * np.array([one.of(name) for one in predictions]) for name in names}
@@ -367,17 +318,6 @@ class _Planner:
                 where="aim",
             )
         return {name: 2.0 * prediction.of(name) for name in names}
-
-    def _left_of(self, opening: list[PlannedMove]) -> list[PlannedMove]:
-        """What of the opening was not driven yet, or only a little."""
-        durations = np.array([move.duration for move in opening])
-        enough = REST + np.cumsum(durations) - (1.0 - BEGUN_SHARE) * durations
-        seconds = 0.0 if self.driven is None else len(self.driven) * self.dt
-        return [move for move, end in zip(opening, enough.tolist(), strict=True) if end > seconds]
-
-    def _logs(self, robot: Robot, share: FloatArray, rng: np.random.Generator) -> list[Run]:
-        """The log of a program, and that of what was driven before."""
-        return [self._recorded(robot, rows, rng) for rows in (share, self.driven) if rows is not None]
 
     def _recorded(self, robot: Robot, share: FloatArray, rng: np.random.Generator) -> Any:
         return recorded(robot, share, self.dt, self.noise, rng)
