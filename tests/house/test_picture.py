@@ -12,7 +12,7 @@ SCREENS = 150  # lines: three
 
 def test_the_picture_is_that_of_the_imports():
     assert MADE.filled(PAGE) == PAGE, "draw it again: python docs/house_picture.py"
-    assert "  cli -> " in PAGE
+    assert " 9  cli -> " in PAGE
 
 
 def test_a_room_stands_on_the_nearest_only():

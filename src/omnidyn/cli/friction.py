@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import typer
 
 import omnidyn
@@ -11,9 +9,6 @@ from omnidyn.cli.log_options import keep_inputs
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.telling import tell
-
-if TYPE_CHECKING:
-    pass
 
 
 def friction(

@@ -12,17 +12,17 @@ import numpy as np
 
 from omnidyn.arguments import check_order, is_number
 from omnidyn.arrays import FloatArray
-from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
+from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.problem.nuisances import PUSH, TILT
 from omnidyn.identification.planning.aims import NEXT, PlanAim, aim_of, fitted_keys, known_of
 from omnidyn.identification.planning.information import Prediction, information_of, told_by
-from omnidyn.identification.planning.limits import GRIP, PlanLimits, limits_of
+from omnidyn.identification.planning.limits import GRIP, PlanLimits, limits_of, refuse_set_points
 from omnidyn.identification.planning.moves import FORWARD, RAMP, SIDEWAYS, STEP, TURN, PlannedMove, all_moves
 from omnidyn.identification.planning.planned import Plan, Predicted
 from omnidyn.identification.planning.recorded import Noise, driven, noise_of, recorded
 from omnidyn.identification.planning.search import ROOM, UNKNOWN, TriedMove, chosen, fitting, tried
-from omnidyn.model.drive import DUTY, SPEED
+from omnidyn.model.drive import DUTY
 from omnidyn.model.keys import expand, find_key, friction_keys
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
@@ -94,13 +94,7 @@ def plan(
     width, depth = _room(area)
     _check("seconds", seconds, SHORTEST, LONGEST, "s")
     _check("rate", rate, SLOWEST, FASTEST, "Hz")
-    if robot.drive.kind == SPEED:
-        raise UnsupportedError(
-            "a firmware holds the speeds of the wheels: no plan is made for its set points",
-            got=robot.name,
-            expected="a robot that takes volts or duties",
-            remedy="plan for the same robot without [drive] kind = speed, if its motors can be driven directly",
-        )
+    refuse_set_points(robot)
     goal = aim_of(aim, robot)
     question = _question(robot, free, goal)
     planner = _planner(robot, 1.0 / rate, noise, question, limits)
