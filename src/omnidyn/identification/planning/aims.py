@@ -96,7 +96,8 @@ def fitted_keys(robot: Robot) -> tuple[str, ...]:
             "no fit: no number of this robot was identified",
             got=robot.name,
             expected="a robot file that identify -o wrote, fit.toml",
-            where="aim",
+            remedy="plan a first drive, fit its log, and plan the next one for that file",
+            where=robot.name,
         )
     return keys
 
