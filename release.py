@@ -35,6 +35,7 @@ IN_SOURCES += (
     "tests/conftest.py",
     "benchmarks/__main__.py",
     "docs/index.md",
+    "recipe/recipe.yaml",
 )
 
 TRIAL = """
@@ -73,6 +74,7 @@ def disagreements(root=ROOT):
     places = {
         "src/omnidyn/__init__.py": r'^__version__ = "(.+)"$',
         "CITATION.cff": r"^version: (.+)$",
+        "recipe/recipe.yaml": r'^  version: "(.+)"$',
         "CHANGELOG.md": r"^##+ .*?(\d+\.\d+\.\d+)",  # the first version that a heading names
     }
     found = {}

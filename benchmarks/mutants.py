@@ -1,48 +1,58 @@
-"""Tests of tests: `python -m benchmarks.mutants [ROOM...] [--count 20] [--seed 1] [--seconds 120]`.
+"""Tests of tests: small changes in the code of six rooms, and how many of them the tests of the room see.
 
-Small changes (another comparison, another sign, another constant) are drawn in the code of a room, and the tests
-of that room run on a copy of the tree. A change that no test sees survives. Kernels run as plain Python where they are
-what is meant (NUMBA_DISABLE_JIT). The score is the share that is seen, with its 95 % interval.
+A change (another comparison, another sign, another constant) is drawn among all that a room allows, and the nearest
+tests run on a copy of the tree. A change that no test sees survives. Kernels run as plain Python. Each run is a fork of
+a process that has imported what tests need; one that takes five times the processor time of the unchanged tree hangs,
+and is seen. `python -m benchmarks.mutants [ROOM...] [--count 100] [--seed 1]` runs some rooms, and prints as it goes.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import contextlib
 import copy
+import importlib
 import os
 import random
+import resource
 import shutil
-import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from math import sqrt
 from pathlib import Path
 from typing import NamedTuple
 
+from benchmarks.size import scaled
+from benchmarks.table import Table, machine
+
 ROOT = Path(__file__).resolve().parents[1]
+COUNT, SEED, GOAL = 100, 1, 0.85
+IMPORTED = ("numpy", "scipy.optimize", "scipy.stats", "numba", "matplotlib", "pydantic", "pytest")
 
 
 class Room(NamedTuple):
-    """What is changed, which tests look, and whether kernels run as plain Python."""
+    """What is changed, and which tests look."""
 
     sources: tuple[str, ...]
     tests: tuple[str, ...]
-    plain: bool = False
 
 
 ROOMS = {
     "units": Room(("units.py",), ("tests/logs/columns/test_units.py",)),
     "selection": Room(("identification/selection",), ("tests/identification/selection",)),
     "exact step": Room(
-        ("simulation/exact/step.py",),
+        ("simulation/exact/step.py", "simulation/exact/slopes.py", "simulation/exact/position.py"),
         ("tests/laws/test_exact_step.py", "tests/simulation/exact/test_slopes.py"),
-        plain=True,
     ),
-    "friction": Room(("model/friction",), ("tests/model/friction",), plain=True),
-    "readers": Room(("logs/table",), ("tests/logs/table",)),
+    "implicit step": Room(("simulation/implicit",), ("tests/simulation/implicit", "tests/laws/test_implicit_laws.py")),
+    "friction": Room(("model/friction",), ("tests/model/friction",)),
+    "readers": Room(("logs/table", "logs/readers"), ("tests/logs/table", "tests/logs/readers")),
 }
+# Changes that change nothing: what they are, and why.
+EQUIVALENT: dict[str, str] = {}
 SWAPS: dict[type, type] = {
     ast.Add: ast.Sub,
     ast.Sub: ast.Add,
@@ -94,54 +104,98 @@ def interval(seen: int, count: int) -> tuple[float, float]:
     return middle - half, middle + half
 
 
-def is_seen(tree: Path, room: Room, seconds: float) -> bool:
-    """Whether the tests of a room fail on a copy of the tree; one that hangs is seen too."""
-    env = {**os.environ, "PYTHONPATH": str(tree / "src"), **({"NUMBA_DISABLE_JIT": "1"} if room.plain else {})}
-    call = [sys.executable, "-m", "pytest", "-n0", "-x", "-q", "-p", "no:cacheprovider", *room.tests]
-    try:
-        return subprocess.run(call, cwd=tree, env=env, capture_output=True, timeout=seconds).returncode != 0
-    except subprocess.TimeoutExpired:
-        return True
+def run_of_tests(tree: Path, tests: tuple[str, ...], limit_s: int) -> tuple[bool, float]:
+    """Whether the tests pass on this tree, and their processor time [s]; at most `limit_s` of it are granted."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        with contextlib.suppress(BaseException):
+            resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s))
+            os.chdir(tree)
+            sys.path[:0] = [str(tree / "src"), str(tree)]
+            silence = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(silence, 1)
+            os.dup2(silence, 2)
+            pytest = importlib.import_module("pytest")
+            code = int(pytest.main(["-n0", "-x", "-q", "-p", "no:cacheprovider", *tests]))
+        os._exit(code)
+    _, status, used = os.wait4(child, 0)
+    return status == 0, used.ru_utime + used.ru_stime
 
 
-def score(name: str, count: int, seed: int, seconds: float) -> tuple[int, list[str]]:
-    """How many of the mutants of a room are seen, and those that are not."""
-    room, rng, survivors = ROOMS[name], random.Random(seed), []
+def copy_of_the_tree(tree: Path) -> Path:
+    """A copy of all that tests read; its package."""
+    for part in ("src", "tests", "benchmarks", "docs", "examples"):
+        shutil.copytree(ROOT / part, tree / part, ignore=shutil.ignore_patterns("_build", "results"))
+    for file in (path for path in ROOT.glob("[!.]*") if path.is_file()):
+        shutil.copy(file, tree)
+    return tree / "src" / "omnidyn"
+
+
+def survivors_of(room: Room, count: int, seed: int, hear: Callable[[str], None]) -> tuple[int, list[str]]:
+    """How many changes were drawn in a room, and those that its tests do not see."""
+    survivors: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
-        tree = Path(folder)
-        for part in ("src", "tests", "benchmarks", "docs", "examples"):
-            shutil.copytree(ROOT / part, tree / part, ignore=shutil.ignore_patterns("_build", "results"))
-        for file in ("pyproject.toml", "dev.py", "release.py"):
-            shutil.copy(ROOT / file, tree)
-        package = tree / "src" / "omnidyn"
+        package = copy_of_the_tree(Path(folder))
         found = (package / part for part in room.sources)
         files = sorted(file for part in found for file in ([part] if part.is_file() else part.rglob("*.py")))
-        candidates = [(file, k) for file in files for k in places(ast.parse(file.read_text("utf-8")))]
-        if is_seen(tree, room, 4.0 * seconds):
-            raise SystemExit(f"{name}: the tests fail without any change")
-        for file, place in rng.sample(candidates, min(count, len(candidates))):
+        drawn = [(file, k) for file in files for k in places(ast.parse(file.read_text("utf-8")))]
+        random.Random(seed).shuffle(drawn)  # fewer changes are the first of more
+        passes, seconds = run_of_tests(Path(folder), room.tests, 600)
+        if not passes:
+            raise SystemExit(f"{' '.join(room.tests)}: the tests fail without any change")
+        hear(f"{len(drawn)} places; unchanged {seconds:.1f} s")
+        for file, place in drawn[:count]:
             text = file.read_text("utf-8")
             changed, words = mutated(text, place)
             file.write_text(changed, "utf-8")
-            if not is_seen(tree, room, seconds):
-                survivors.append(f"{file.relative_to(package)}:{words}")
+            survives, _ = run_of_tests(Path(folder), room.tests, int(5.0 * seconds) + 10)
             file.write_text(text, "utf-8")
-    return min(count, len(candidates)) - len(survivors), survivors
+            if survives:
+                survivors.append(f"{file.relative_to(package)}:{words}")
+                hear(f"survives: {survivors[-1]}")
+    return min(count, len(drawn)), survivors
+
+
+def without_line(survivor: str) -> str:
+    """A change by its file and words: lines move."""
+    file, _, rest = survivor.partition(":")
+    return f"{file}:{rest.partition(':')[2]}"
+
+
+def measure(
+    rooms: list[str] | None = None,
+    count: int | None = None,
+    seed: int = SEED,
+    hear: Callable[[str], None] = lambda words: None,
+) -> Table:
+    """The table of rooms; below it what survived, and why where nothing is changed by it."""
+    os.environ["NUMBA_DISABLE_JIT"] = "1"
+    for name in IMPORTED:
+        importlib.import_module(name)
+    table = Table("mutants: changes of the code that tests see", ["room", "changes", "seen", "from %", "to %", "cpu s"])
+    count = scaled(COUNT, 1) if count is None else count
+    for name in rooms or ROOMS:
+        begun = time.process_time() + sum(os.times()[2:4])
+        drawn, survivors = survivors_of(ROOMS[name], count, seed, hear)
+        seen = drawn - len(survivors)
+        low, high = (round(100.0 * share) for share in interval(seen, drawn))
+        seconds = round(time.process_time() + sum(os.times()[2:4]) - begun)
+        cells = {"room": name, "changes": drawn, "seen": seen, "from %": low, "to %": high, "cpu s": seconds}
+        table.add(**cells, goal=f">= {GOAL:.0%} seen", met=seen >= GOAL * drawn)
+        hear(f"{name}: {seen} of {drawn} seen, 95 % interval {low} to {high} %, {seconds} s")
+        table.notes += [f"{each}: {EQUIVALENT.get(without_line(each), 'not seen')}" for each in survivors]
+    table.notes.append(machine())
+    return table
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"of {', '.join(ROOMS)}; by default all")
-    parser.add_argument("--count", type=int, default=20, help="mutants in each room")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=120.0, help="after which a run of tests hangs")
+    parser.add_argument("--count", type=int, default=COUNT, help="changes in each room")
+    parser.add_argument("--seed", type=int, default=SEED)
     options = parser.parse_args()
-    for name in options.rooms or ROOMS:
-        seen, survivors = score(name, options.count, options.seed, options.seconds)
-        low, high = interval(seen, seen + len(survivors))
-        print(f"{name}: {seen} of {seen + len(survivors)} seen, 95 % interval {low:.0%} to {high:.0%}", flush=True)
-        for survivor in survivors:
-            print(f"  survives: {survivor}", flush=True)
+    measure(options.rooms, options.count, options.seed, lambda words: print(words, flush=True))
     return 0
 
 

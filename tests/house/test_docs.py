@@ -11,7 +11,9 @@ from omnidyn.export.features import TABLE
 from tests.support.robot_keys import generator
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-PAGES = sorted(DOCS.rglob("*.md"))
+ROOT = DOCS.parent
+PAGES = sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts)
+WITH_LINKS = [*PAGES, *ROOT.glob("*.md"), *ROOT.glob("examples/**/*.md"), *ROOT.glob("benchmarks/results/*.md")]
 COMMANDS = {command.name or command.callback.__name__ for command in app.registered_commands if command.callback}
 THERE = COMMANDS | set(omnidyn.__all__) | set(TABLE)
 ABSENT = re.compile(r"(\w[\w-]*)`?\s+(?:is|are)\s+(?:missing|not yet|not there|not supported|not implemented)\b")
@@ -66,3 +68,38 @@ def test_a_long_page_begins_with_an_index(page):
     assert "<!-- index -->" in head
     links = head[head.index("<!-- index -->") : head.index("<!-- end of index -->")].count("](#")
     assert links >= len(titles) >= 5
+
+
+def without_code(text):
+    """A page without its blocks of code, and without what stands between backticks."""
+    return re.sub(r"^```.*?^```|^(?: {4}.*\n)+|`[^`\n]*`", "", text, flags=re.DOTALL | re.MULTILINE)
+
+
+def anchors(text):
+    """What may stand behind # in a link to a page: its headings, as GitHub and Sphinx write them."""
+    titles = re.findall(r"^#+ (.+)$", re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def dead_links(page, text):
+    """Links of a page to files, and to headings of pages, that are not there."""
+    dead = []
+    for link in re.findall(r"\]\(([^)\s]+)\)", without_code(text)):
+        name, _, anchor = link.partition("#")
+        target = (page.parent / name) if name else page
+        there = re.match(r"\w+:", link) or target.exists()
+        if not there or (anchor and target.suffix == ".md" and anchor not in anchors(target.read_text("utf-8"))):
+            dead.append(link)
+    return dead
+
+
+def test_every_local_link_leads_somewhere():
+    """Sphinx is told not to look: README.md links to files that are no pages of the documentation."""
+    assert {page.name: dead for page in WITH_LINKS if (dead := dead_links(page, page.read_text("utf-8")))} == {}
+
+
+def test_it_sees_a_link_that_leads_nowhere():
+    page = DOCS / "tested.md"
+    links = ("nowhere.md", "robot-file.md#nowhere", "../README.md", "robot-file.md#body", "#missed", "#nowhere")
+    text = page.read_text("utf-8") + " ".join(f"[`b`]({link})" for link in links)
+    assert dead_links(page, text) == ["nowhere.md", "robot-file.md#nowhere", "#nowhere"]

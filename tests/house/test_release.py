@@ -10,7 +10,7 @@ import pytest
 import release
 
 ROOT = Path(__file__).resolve().parents[2]
-PLACES = ("pyproject.toml", "src/omnidyn/__init__.py", "CITATION.cff", "CHANGELOG.md")
+PLACES = ("pyproject.toml", "src/omnidyn/__init__.py", "CITATION.cff", "recipe/recipe.yaml", "CHANGELOG.md")
 
 
 def test_the_version_is_the_same_everywhere():
