@@ -1,14 +1,16 @@
 """Which of two models predicts blocks better, against scipy, closed forms, and logs of noise."""
 
+from dataclasses import FrozenInstanceError
+
 import numpy as np
 import pytest
-from scipy.stats import binom, t, ttest_rel, wilcoxon
+from scipy.stats import binom, norm, t, ttest_rel, wilcoxon
 
-from omnidyn.identification.selection.blocks import LIMIT, compare_blocks
+from omnidyn.identification.selection.blocks import LIMIT, LIMIT_ERRORS, compare_blocks
 from tests.support.held_out_blocks import errors_of_blocks
 
 
-@pytest.mark.parametrize("count", [4, 10, 20])
+@pytest.mark.parametrize("count", [2, 4, 10, 20])
 def test_p_is_that_of_scipy(count):
     for seed in range(20):
         without, with_effect = np.exp(np.random.default_rng(seed).normal([[0.3], [0.0]], 1.0, (2, count)))
@@ -100,6 +102,27 @@ def test_the_standard_error_is_that_of_the_ratios():
     ratio = np.random.default_rng(5).normal(0.1, 0.02, 10)
     comparison = compare_blocks(np.exp(ratio), np.ones(10))
     assert comparison.std == pytest.approx(np.exp(-ratio.mean()) * ratio.std(ddof=1) / np.sqrt(10), rel=0.02)
+
+
+@pytest.mark.parametrize("way", [1, -1], ids=["better", "worse"])
+def test_the_standard_error_is_the_slope_of_the_gain_times_that_of_the_ratios(way):
+    """Of blocks of which each is about three times as bad with or without the effect, with an ordinary error of 1."""
+    size = 3.0 * np.exp(np.random.default_rng(6).normal(0.0, 1e-4, 10))
+
+    def comparison(sizes):
+        return compare_blocks(*(sizes, np.ones(len(sizes)))[::way])
+
+    by = 1e-5
+    higher, lower = (comparison(2.0 * np.full(10, np.exp(np.log(2.0) + way * off)) - 1.0).gain for off in (by, -by))
+    ratio = np.log((size + 1.0) / 2.0)
+    expected = (higher - lower) / (2.0 * by) * ratio.std(ddof=1) / np.sqrt(10)
+    assert comparison(size).std == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_limit_is_about_its_standard_errors_and_a_comparison_stays_as_it_is():
+    assert abs(norm.sf(LIMIT_ERRORS) - LIMIT) < 2e-3
+    with pytest.raises(FrozenInstanceError):
+        compare_blocks([2.0, 2.0], [1.0, 1.0]).p = 0.0
 
 
 def found(effect, count, logs=1000, **kind):

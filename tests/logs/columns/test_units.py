@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from omnidyn import units
 from omnidyn.errors import InputError
 from omnidyn.units import known_unit, parse_unit
 
@@ -78,6 +79,8 @@ def test_one_of_a_unit_in_si(text, quantity, one_in_si):
         "m/0s",
         "pix/s",
         "V/s",
+        "m/V",
+        "ticks/kg",
         "MA",
     ],
 )
@@ -118,10 +121,26 @@ DEFINED = {  # what one of each is in SI; mutants of the table survived where on
     0.3048: "ft",
     math.pi / 180: "deg dps",
     2 * math.pi: "rev turn turns rot rev/s turn/s rps Hz",
-    2 * math.pi / 60: "rev/min rot/min",
+    2 * math.pi / 60: "rpm rev/min rot/min 1/min",
 }
+OTHERS = {  # signs beside letters, and names that are not one word
+    1.0: ("N m", "N·m", "N⋅m", "N*m", "N.m", "°C", "degC", "m/s^2", "m/s²", "rad/s^2", "rad/s²"),
+    1e-6: ("\N{MICRO SIGN}s", "\N{GREEK SMALL LETTER MU}s"),
+    0.01: ("%", "pct"),
+    1 / 3.6: ("km/h",),
+    math.pi / 180: ("°", "deg/s", "°/s"),
+    2 * math.pi: ("turns/s", "rot/s"),
+    0.0254: ("in",),
+    1 / 255: ("pwm",),
+}
+EACH = [(text, one) for one, names in DEFINED.items() for text in names.split()]
+EACH += [(text, one) for one, names in OTHERS.items() for text in names]
 
 
-@pytest.mark.parametrize("text, one", [(text, one) for one, names in DEFINED.items() for text in names.split()])
+@pytest.mark.parametrize("text, one", EACH)
 def test_one_of_each_name_is_its_definition(text, one):
     assert parse_unit(text).size == pytest.approx(one, rel=1e-15)
+
+
+def test_no_name_is_left_out():
+    assert {name for names in units._TABLE.values() for name in names} <= {text for text, _ in EACH}
