@@ -45,11 +45,15 @@ ROOMS = {
     "selection": Room(("identification/selection",), ("tests/identification/selection",)),
     "exact step": Room(
         ("simulation/exact/step.py", "simulation/exact/slopes.py", "simulation/exact/position.py"),
-        ("tests/laws/test_exact_step.py", "tests/simulation/exact/test_slopes.py"),
+        (
+            "tests/laws/test_exact_step.py",
+            "tests/simulation/exact/test_position.py",
+            "tests/simulation/exact/test_slopes.py",
+        ),
     ),
-    "implicit step": Room(("simulation/implicit",), ("tests/simulation/implicit", "tests/laws/test_implicit_laws.py")),
-    "friction": Room(("model/friction",), ("tests/model/friction",)),
-    "readers": Room(("logs/table", "logs/readers"), ("tests/logs/table", "tests/logs/readers")),
+    "implicit step": Room(("simulation/implicit/step.py",), ("tests/simulation/implicit/test_one_step.py",)),
+    "friction": Room(("model/friction",), ("tests/model/friction/test_bristles.py", "tests/model/friction")),
+    "readers": Room(("logs/table",), ("tests/logs/table/test_table.py", "tests/logs/table")),
 }
 # Changes that change nothing: what they are, and why.
 EQUIVALENT: dict[str, str] = {}

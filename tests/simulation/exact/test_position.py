@@ -1,6 +1,7 @@
 """How far a body gets in one step, beside SciPy's quadrature of the speeds; its derivatives, beside differences."""
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -57,10 +58,7 @@ def by_quadrature(step):
         return (cos * speed(0, t) - sin * speed(1, t), sin * speed(0, t) + cos * speed(1, t))[row]
 
     edges = sorted({0.0, step.dt, *(part[0] for part in parts)})
-    return [
-        sum(quad(moves, *ends, args=(row,), epsabs=1e-15)[0] for ends in zip(edges, edges[1:], strict=False))
-        for row in (0, 1)
-    ]
+    return [sum(quad(moves, *ends, args=(row,), epsabs=1e-15)[0] for ends in pairwise(edges)) for row in (0, 1)]
 
 
 @pytest.mark.parametrize("name", STEPS)
