@@ -30,8 +30,10 @@ def test_blocks_that_all_improve_alike_have_p_of_all_heads(count):
     assert compare_blocks(np.full(count, 0.5), np.ones(count)).p == pytest.approx(1.0 - 0.5**count)
 
 
-def test_two_blocks_decide_nothing():
+def test_one_block_and_two_decide_nothing():
     assert not compare_blocks([1.0, 1.0], [0.1, 0.1001]).is_better
+    single = compare_blocks([1.0], [0.1])  # it has no scatter: neither a standard error nor a limit of t
+    assert (single.std, single.t, single.p) == (0.0, np.inf, 0.5)
     assert compare_blocks([1.0, 1.0, 1.0], [0.1, 0.1, 0.1001]).is_better
 
 
