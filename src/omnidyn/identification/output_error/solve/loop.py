@@ -30,7 +30,7 @@ from omnidyn.sensors import TRAVEL
 from omnidyn.statement import WARNING, Statement
 
 FINE_TOLERANCE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
-SETTING_OFF, LEAST_ROWS = 3.0, 300  # [s], rows of each log, from what first asks it to move on, on which starts are tried
+SETTING_OFF, LEAST_ROWS = 3.0, 300  # [s], rows from the first set speed on, of each log, on which starts are tried
 STILL_ROWS = 3  # rows at the beginning in which nothing may move
 MOTION_ERRORS = 6.0  # standard errors, of the scatter of these rows, that count as motion
 LATENCY, CURRENTS = "latency", "latency.current"
@@ -249,8 +249,9 @@ def best_start(solver: Solver, progress: FitProgress) -> Point:
     solutions = []
     for k in np.argsort([state.objective for state in by_delay])[:BEST].tolist():
         factors = [(delays[k], *pair) for pair in itertools.product(levels, gains)]
-        states = sorted(_tried(solver, factors, "friction and gains", below_progress), key=lambda state: state.objective)
-        solutions += [solver.minimise(state.point, FEW_ITERATIONS, below_progress) for state in states[:BEST]]
+        states = _tried(solver, factors, "friction and gains", below_progress)
+        best_states = sorted(states, key=lambda state: state.objective)[:BEST]
+        solutions += [solver.minimise(state.point, FEW_ITERATIONS, below_progress) for state in best_states]
     return min(solutions, key=lambda solution: solution.state.objective).state.point
 
 
