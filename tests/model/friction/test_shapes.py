@@ -41,7 +41,11 @@ def test_it_falls_from_1_to_0_as_its_formula_says_in_numbers_and_arrays(shape, e
 def test_its_slope_at_rest_is_that_of_its_formula_or_of_its_chord(shape, exponent):
     chord = (FALLS[shape](CHORD, exponent) - 1.0) / CHORD
     expected = chord if exponent < 1.0 else (slope_of(shape, 0.0, 1.0) if exponent == 1.0 else 0.0)
-    assert fall(0.0, list(SHAPES).index(shape), exponent)[1] == pytest.approx(expected, rel=1e-9)
+    number, below = list(SHAPES).index(shape), 0.25 * CHORD
+    assert fall(0.0, number, exponent)[1] == pytest.approx(expected, rel=1e-9)
+    value = 1.0 + chord * below if exponent < 1.0 else FALLS[shape](below, exponent)
+    assert fall(below, number, exponent)[0] == pytest.approx(value, rel=1e-12)
+    assert fallen(below, 1.0, exponent, number) == pytest.approx(value, rel=1e-12)
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -169,5 +169,23 @@ def test_friction_that_falls_and_bristles_follow_the_same_two_stages(law, place)
         return np.array([matrix[0] * x[0] + forced - force / MASS, bend_rate])
 
     for h in (1e-3, 0.01):
+        run = simulate(which, [[0.0, 3.0, -3.0]] * 2, h, twist=(0.12, 0.0, 0.0), tol=None)
         expected = two_stages(rate, [0.12] if law == "Stribeck" else [0.12, 0.0], h)
-        assert one_step(which, 3.0, h, 0.12)[0] == pytest.approx(expected[0], rel=0.0, abs=1e-9)
+        assert run.twist[1, 0] == pytest.approx(expected[0], rel=0.0, abs=1e-9)
+        assert run.twist[2, 0] == pytest.approx(two_stages(rate, expected, h)[0], rel=0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_speed_within_the_band_of_karnopp_is_0_and_one_beyond_it_slides(place):
+    if place == "axes":
+        law = {"axes": AxesFriction(viscous=(VISCOUS,) * 3, coulomb=(COULOMB,) * 3, **karnopp(3 * (0.05,)))}
+    else:
+        law = {"direction": DirectionFriction(coulomb=(COULOMB,) * 2, viscous=VISCOUS, **karnopp(0.05))}
+    which = implicit(AXEBOT.replace(friction=Friction(**law)))
+    assert one_step(which, 0.2, 1e-3, 0.04)[0] == 0.0
+    assert one_step(which, 3.0, 0.01, 0.4)[0] == pytest.approx(sdirk2(*system(3.0, COULOMB), [0.4], 0.01)[0], **NEAR)
+
+
+def karnopp(width):
+    """Its band [m/s]."""
+    return {"law": "karnopp", "karnopp_speed": width}
