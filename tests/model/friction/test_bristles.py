@@ -108,3 +108,17 @@ def test_on_an_axis(kind):
         assert force == pytest.approx(-SIGMA * bent - damping(kind, abs(v[0])) * ends, rel=1e-9)
         up, down = (plain(bristle_force)(element, v[0] + off, z[0], tau)[0] for off in (MUCH, -MUCH))
         assert slope == pytest.approx((up - down) / (2.0 * MUCH), rel=1e-4, abs=1e-3)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_does_not_move_bends_no_further(kind):
+    bent = (0.3e-3, -0.2e-3)
+    force, _, after = plain(plane_force)(in_plane(**KINDS[kind]), 0.0, 0.0, bent, 1e-3)
+    assert after == bent
+    assert force == pytest.approx((-SIGMA * bent[0], -SIGMA * bent[1]), rel=1e-12)
+
+
+def test_what_is_held_on_one_axis_gives_way_on_another():
+    """Without a division by the sign of what is 0."""
+    law = AxesFriction(viscous=(1.0,) * 3, coulomb=(2.0, 2.0, 0.1), breakaway=(3.0, 3.0, 0.2))
+    assert law.wrench(np.zeros(3), [0.0, -3.5, 0.15]) == pytest.approx([0.0, 2.0, -0.15])
