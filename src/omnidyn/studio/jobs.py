@@ -70,13 +70,13 @@ def main() -> None:
             elif "command" in message:
                 commands.put(message["command"])
             else:
+                while not commands.empty():  # to the job before
+                    commands.get()
                 messages.put(message)
         os._exit(0)  # the server is gone: nobody waits for the job
 
     threading.Thread(target=read, daemon=True).start()
     while (message := _next(messages)) is not None:
-        while not commands.empty():
-            commands.get()
         working.set()
         try:
             kind, value = _answer(message, tell, commands)

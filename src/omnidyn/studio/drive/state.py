@@ -65,6 +65,6 @@ class Driving:
         if self.running:
             if "record" in command:
                 self.recording = bool(command["record"])
-            self.session.workers["drive"].send({"command": command})
+            self.session.workers["drive"].command(command)
             if "record" in command:
                 self.session.changed(DRIVE)

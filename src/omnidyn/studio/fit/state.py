@@ -192,7 +192,7 @@ class Fitting:
             "groups": [*groups.values()],
             "command": command,
         }
-        self.session.workers["fit"].send({"command": "fit"})  # what warms up makes way
+        self.session.workers["fit"].command("fit")  # what warms up makes way
         await fit.run(self.session, FIT, "fit", "fit", request)
         if fit.result is not None:
             self.keep(fit, recipe=recipe)
