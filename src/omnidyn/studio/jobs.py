@@ -22,6 +22,7 @@ from omnidyn.studio.fit.job import fit, free_keys, warm
 from omnidyn.studio.job import Tell
 from omnidyn.studio.live.job import watch
 from omnidyn.studio.log.job import align, check, example, save_columns
+from omnidyn.studio.planned.job import drive_plan, follow, plan
 from omnidyn.studio.robot.job import check_robot
 from omnidyn.studio.track.job import track
 from omnidyn.studio.worker import Listener
@@ -40,6 +41,9 @@ JOBS: dict[str, Callable[[Mapping[str, Any], Tell, Any], dict[str, Any]]] = {
     "compare": compare,
     "drift": drift,
     "watch": watch,
+    "plan": plan,
+    "drive_plan": drive_plan,
+    "follow": follow,
 }
 
 
