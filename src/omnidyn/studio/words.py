@@ -22,6 +22,7 @@ PAGE_NAMES = {  # option of a call -> where a page has it
     "ladder": "--ladder",
     "loss": "--loss",
     "nuisances": "--nuisances",
+    "resume": "“It stands in the middle again: go on”",
     "unit": "in unit (tab Log, Columns and units)",
 }
 AS_WRITTEN = ("columns", "key", "learnt", "numbers", "reading", "unused", "values")  # of a result: no words of the library

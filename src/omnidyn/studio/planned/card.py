@@ -31,9 +31,12 @@ class PlanCard:
         self.page.part(self._plan, PLAN, ROBOT, of=lambda: (planned.is_planned, planned.last.running, id(planned.last)))
         self.page.part(self._robot, PLAN, COURSE, DRIVE, ROBOT, of=self._of_robot)
         self.page.part(self._ended, PLAN, COURSE, ROBOT, of=self._of_end)
-        self.page.part(self._key, PLAN, COURSE, ROBOT, of=lambda: planned.is_planned)
+        with ui.element("div").classes("run"):
+            with ui.element("div"):
+                self.page.part(self._key, PLAN, COURSE, ROBOT, of=lambda: planned.is_planned)
+            with ui.element("div"):
+                self.page.part(self._bars, BARS, PLAN, ROBOT)
         self.page.parts.setdefault(COURSE, []).append(self._course)
-        self.page.part(self._bars, BARS, PLAN, ROBOT)
         self.page.part(self._calls, PLAN, ROBOT, of=lambda: (planned.is_planned, planned.last.command))
 
     def _is_busy(self) -> bool:
@@ -114,7 +117,7 @@ class PlanCard:
         with ui.row().classes("line"):
             if planned.stage == RUNNING:
                 ui.button("Stop", on_click=planned.stop).props("outline no-caps id=stop-plan")
-            if planned.stage == STOPPED and (result is None or result["left"]):
+            if planned.stage == STOPPED and planned.can_go_on:
                 words = "It stands in the middle again: go on"
                 ui.button(words, on_click=planned.go_on).props("unelevated no-caps id=go-on")
             if planned.logs and planned.stage != RUNNING:
@@ -138,12 +141,14 @@ class PlanCard:
     def _bars(self) -> None:
         """How well each number is known by now, beside what is wanted and what was planned."""
         planned, result = self.planned, self.planned.last.result
-        if not planned.is_planned or result is None or planned.status is None:
+        if not planned.is_planned or result is None:
             return
-        status = planned.status
-        verdict(status["severity"], status["verdict"], "told-verdict")
-        with ui.element("div").classes("meters").props("id=told"):
-            for number in status["numbers"]:
+        status = planned.status or {"numbers": [], "said": []}
+        if planned.status is not None:
+            verdict(status["severity"], status["verdict"], "told-verdict")
+        unknown = [{**number, "within": planned.within / 100.0, "reached": False} for number in result["numbers"]]
+        with ui.element("div").classes("meters narrow").props("id=told"):
+            for number in status["numbers"] or unknown:
                 bar(number, (result["promises"].get(number["key"]) or [None])[0])
         for severity, words in status["said"]:
             ui.label(f"{severity}: {words}").classes("text")

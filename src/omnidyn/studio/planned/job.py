@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import omnidyn
-from omnidyn.document import plain
+from omnidyn.document import plain, sentence
 from omnidyn.driving.clock import PacedClock
 from omnidyn.driving.connection import RobotConnection
 from omnidyn.driving.drive import DriveMoment
@@ -23,6 +23,7 @@ from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.live.live import Live
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH
+from omnidyn.model.keys import in_words, unit
 from omnidyn.report.figures.robot import wheel_lines, wheel_places
 from omnidyn.run import Run
 from omnidyn.studio.job import Tell, robot_of, timed
@@ -50,6 +51,10 @@ def plan(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any
         **shown_document(made.document()),
         "promises": plain({key: [number.half, number.worst] for key, number in made.predicted.items()}),
         "learnt": list(made.learnt),
+        "numbers": [
+            {"key": key, "name": in_words(key), "unit": unit(key), "value": made.predicted[key].value, "half": None}
+            for key in made.learnt
+        ],
         "noise": {channel: std.tolist() for channel, std in made.noise.items()},
         "course": course(program),
     }
@@ -88,8 +93,8 @@ def drive_plan(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[st
     tell("course", course(program))
     connection, teller = _connection(request, program), _Teller(tell)
     record = omnidyn.drive(program, connection, held=held, follow=teller.hear)
-    result = {"verdict": str(record.verdict), "severity": record.verdict.severity, "complete": record.is_complete}
-    result |= {"remedy": "" if record.stopped is None else record.stopped.remedy_text, "log": "", "left": None}
+    result = {"verdict": record.document().verdict_text, "severity": record.verdict.severity, "complete": record.is_complete}
+    result |= {"remedy": "" if record.stopped is None else sentence(record.stopped.remedy_text), "log": "", "left": None}
     if record.run is not None and record.rows:
         omnidyn.write_run(record.run, request["log"])
         result["log"] = request["log"]

@@ -86,6 +86,7 @@ class Planned:
         self.result, self.status, self.trouble, self.course, self.stage = None, None, "", None, READY
         command, python = calls.plan(session.robot_path, self.area, self.seconds, self.to, "planned-1.csv")
         self.last = last = Task(command=command, python=python)
+        session.start(session.workers["drive"].start())  # what drives is there when the key is pressed
         request = {"robot": session.robot_path, "area": [*self.area], "seconds": self.seconds}
         await last.run(session, PLAN, PLAN, "plan", request)
         if last.result is not None:
@@ -114,9 +115,15 @@ class Planned:
         if self.stage == RUNNING:
             self.session.workers["drive"].command({"held": False})
 
+    @property
+    def can_go_on(self) -> bool:
+        """Whether something is left of what was stopped."""
+        return self.result is None or bool(self.result["left"])
+
     def go_on(self) -> None:
         """The robot stands in the middle again: what is left comes next."""
-        if self.stage == STOPPED and self.course is not None:
+        if self.stage == STOPPED and self.can_go_on:
+            self.course = self.result["left"] if self.result else self.course
             self.stage, self.result, self.trouble = READY, None, ""
             self.session.changed(PLAN, COURSE)
 
@@ -173,7 +180,6 @@ class Planned:
             self.session.made.add(log.key)
             assert self.last.result is not None
             self.session.promises[log.key] = self.last.result["promises"]
-        self.course = result["left"] or self.course
 
     async def _follow(self, free: list[str]) -> None:
         """Let the rows of the drive tell what they do."""
