@@ -6,7 +6,6 @@ import pytest
 
 import omnidyn
 from omnidyn.driving.drive import drive
-from omnidyn.driving.guard import Limits
 from omnidyn.driving.simulated import PUSHED, Fault, SimulatedRobot
 from omnidyn.model.log_effects import Sensors
 from tests.support.faulty_drives import axebot_program

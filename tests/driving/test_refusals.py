@@ -64,7 +64,9 @@ def test_a_duty_beyond_the_supply_is_refused():
 def test_volts_beyond_the_limit_of_a_motor_are_refused():
     rows = ROWS.copy()
     rows[3] = (0.0, 5.0, -6.5)
-    with pytest.raises(InputError, match=r"volts beyond the limit of the motor; got 6\.5 V at wheel 3; expected .* 6 V"):
+    with pytest.raises(
+        InputError, match=r"volts beyond the limit of the motor; got 6\.5 V at wheel 3; expected .* 6 V"
+    ):
         DriveProgram(ROBOT, 0.02, rows)
     one_weaker = ROBOT.replace(motor=ROBOT.motor.replace(voltage_limit=(6.0, 2.0, 6.0)))
     with pytest.raises(InputError, match=r"got 3 V at wheel 2; expected at most 2 V.*; take smaller volts"):

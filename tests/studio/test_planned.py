@@ -48,9 +48,15 @@ def drive(planned, tmp_path, looks=-1, logs=(), number=1):
     made, folder = planned
     told = []
     request = {
-        "robot": "axebot", "program": str(folder / job.PROGRAM), "area": made["course"]["area"], "logs": [*logs], "to": "",
-        "pace": 1e9, "noise": made["noise"], "log": str(tmp_path / f"planned-{number}.csv"),
-    }  # fmt: skip
+        "robot": "axebot",
+        "program": str(folder / job.PROGRAM),
+        "area": made["course"]["area"],
+        "logs": [*logs],
+        "to": "",
+        "pace": 1e9,
+        "noise": made["noise"],
+        "log": str(tmp_path / f"planned-{number}.csv"),
+    }
     result = job.drive_plan(request, lambda kind, value: told.append((kind, value)), Keys(looks))
     return told, result, request["log"]
 
@@ -102,7 +108,9 @@ def test_a_key_that_is_let_go_stops_it_and_the_rest_is_driven_next(planned, tmp_
 def test_what_goes_wrong_stops_it_and_is_said(planned, tmp_path, monkeypatch, fault, words):
     def faulty(request, program):
         faults = [Fault(fault, 4.0, 60.0, 1)]
-        return SimulatedRobot(program.robot, {"wheel_speed": 0.1, "twist": (0.02, 0.02, 0.1)}, rate=100.0, faults=faults)
+        return SimulatedRobot(
+            program.robot, {"wheel_speed": 0.1, "twist": (0.02, 0.02, 0.1)}, rate=100.0, faults=faults
+        )
 
     monkeypatch.setattr(job, "_connection", faulty)
     _, result, log = drive(planned, tmp_path)
@@ -137,7 +145,7 @@ def test_a_page_that_says_nothing_holds_no_key(monkeypatch):
 
 @pytest.mark.parametrize(("to", "words"), [("-", "not a robot of this page"), ("udp:x", "not an address")])
 def test_an_address_that_is_none_is_refused(planned, tmp_path, to, words):
-    made, folder = planned
+    _, folder = planned
     request = {"robot": "axebot", "program": str(folder / job.PROGRAM), "area": [3.0, 3.0], "logs": [], "to": to}
     with pytest.raises(InputError, match=words):
         job.drive_plan({**request, "log": str(tmp_path / "log.csv")}, lambda *_: None, queue.Queue())

@@ -208,9 +208,7 @@ class _Driver:
     def _tell(self) -> None:
         """Who looks on hears where it is."""
         channel, source = self.program.channel, self.program.source or self.program.robot.name
-        moment = DriveMoment(
-            self.rows, self.guard.odometry.place, lambda: self.recording.new_rows(channel, source)
-        )
+        moment = DriveMoment(self.rows, self.guard.odometry.place, lambda: self.recording.new_rows(channel, source))
         self.follow(moment)
 
     def _send(self, inputs: tuple[float, ...]) -> None:

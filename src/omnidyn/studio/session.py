@@ -54,7 +54,8 @@ class Session:
         self.workers = {name: Worker() for name in ("log", "fit", "drive", TRACK, COMPARE, WATCH, PLAN, "warm")}
         self.others = 0  # files that are neither logs nor robots
         self.made = set[str]()  # keys of logs and names of robots that were made here, not brought: no edit takes them
-        self.promises: dict[str, dict[str, list[float | None]]] = {}  # key of a log -> what the plan of its drive promised
+        # key of a log -> key of a number -> what the plan of its drive promised, in the middle and at the worst
+        self.promises: dict[str, dict[str, list[float | None]]] = {}
         self.removed: Removed | None = None
         self.takers: dict[str, Callable[[str, str], object]] = {"": self.add_log, ROBOT_SUFFIX: self.take_robot}
         self.count, self._bytes, self._tasks = 0, 0, set[asyncio.Task[Any]]()

@@ -28,7 +28,9 @@ class DriveTab:
     def build(self) -> None:
         """Lay it out."""
         self.page.part(self.page.robot_choice, ROBOT, of=self.page.robots)
-        mode = ui.toggle([BY_HAND, A_PLAN], value=A_PLAN if self.planned.last.running or self.planned.is_planned else BY_HAND)
+        mode = ui.toggle(
+            [BY_HAND, A_PLAN], value=A_PLAN if self.planned.last.running or self.planned.is_planned else BY_HAND
+        )
         mode.props("no-caps dense unelevated aria-label='what is driven'")
         with ui.element("div").classes("mode") as by_hand:
             self.page.part(self._content, DRIVE, ROBOT)

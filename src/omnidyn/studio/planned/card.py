@@ -26,7 +26,9 @@ class PlanCard:
         """Lay it out."""
         planned = self.planned
         self._wanted()
-        self.page.part(self._start, PLAN, COURSE, ROBOT, of=lambda: (planned.why_not(), self._is_busy(), planned.is_planned))
+        self.page.part(
+            self._start, PLAN, COURSE, ROBOT, of=lambda: (planned.why_not(), self._is_busy(), planned.is_planned)
+        )
         self.page.progress(PLAN, lambda: planned.last, PLAN)
         self.page.part(self._plan, PLAN, ROBOT, of=lambda: (planned.is_planned, planned.last.running, id(planned.last)))
         self.page.part(self._robot, PLAN, COURSE, DRIVE, ROBOT, of=self._of_robot)
@@ -47,7 +49,9 @@ class PlanCard:
         planned = self.planned
         with ui.row().classes("line sizes"):
             for axis, words in enumerate(("room along x [m]", "room along y [m]")):
-                self._number(words, lambda axis=axis: planned.area[axis], lambda v, axis=axis: planned.want_side(axis, v), 0.1)
+                self._number(
+                    words, lambda axis=axis: planned.area[axis], lambda v, axis=axis: planned.want_side(axis, v), 0.1
+                )
             self._number("time [s]", lambda: planned.seconds, lambda v: planned.want(seconds=v), 5.0)
             self._number("enough: ± %", lambda: planned.within, lambda v: planned.want(within=v), 0.5)
 
@@ -93,7 +97,9 @@ class PlanCard:
             )  # fmt: skip
             which.classes("wide which").set_enabled(planned.stage != RUNNING)
             if planned.which == AT_ADDRESS:
-                address = ui.input("Address", value=planned.address, placeholder="udp:192.168.4.1:9870, serial:/dev/ttyUSB0")
+                address = ui.input(
+                    "Address", value=planned.address, placeholder="udp:192.168.4.1:9870, serial:/dev/ttyUSB0"
+                )
                 address.props("stack-label id=address").classes("wide").set_enabled(planned.stage != RUNNING)
                 address.on("change", lambda: planned.want(address=str(address.value or "")))
             if why := planned.why_no_drive():

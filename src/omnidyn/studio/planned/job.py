@@ -93,15 +93,23 @@ def drive_plan(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[st
     tell("course", course(program))
     connection, teller = _connection(request, program), _Teller(tell)
     record = omnidyn.drive(program, connection, held=held, follow=teller.hear)
-    result = {"verdict": record.document().verdict_text, "severity": record.verdict.severity, "complete": record.is_complete}
-    result |= {"remedy": "" if record.stopped is None else sentence(record.stopped.remedy_text), "log": "", "left": None}
+    result = {
+        "verdict": record.document().verdict_text,
+        "severity": record.verdict.severity,
+        "complete": record.is_complete,
+    }
+    result |= {
+        "remedy": "" if record.stopped is None else sentence(record.stopped.remedy_text),
+        "log": "",
+        "left": None,
+    }
     if record.run is not None and record.rows:
         omnidyn.write_run(record.run, request["log"])
         result["log"] = request["log"]
     if not record.is_complete:
         try:
             result["left"] = course(rest_of(program, [record.run] if result["log"] else []))
-        except InsufficientDataError as error:
+        except (InputError, InsufficientDataError) as error:  # the log is written all the same
             result["remedy"] = str(error)
     return result
 
