@@ -10,12 +10,13 @@ import pytest
 pytest.importorskip("nicegui", reason="the extra studio is not installed")
 
 import omnidyn
-from omnidyn.cli import main
 from omnidyn.driving.simulated import MUTE, PUSHED, STUCK, Fault, SimulatedRobot
 from omnidyn.errors import InputError
+from omnidyn.studio import calls
 from omnidyn.studio.layout import Studio
 from omnidyn.studio.planned import job
 from omnidyn.studio.planned.state import AT_ADDRESS, DONE, FAST, READY, RUNNING, STOPPED
+from tests.studio.test_calls import by_hand
 from tests.studio.test_worker import finished
 
 ROBOT = omnidyn.load_robot("axebot")
@@ -64,14 +65,15 @@ def drive(planned, tmp_path, looks=-1, logs=(), number=1):
 def test_the_plan_and_its_log_are_those_of_the_command_line(planned, tmp_path, monkeypatch):
     made, folder = planned
     monkeypatch.chdir(tmp_path)
-    assert main(["plan", "axebot", "--area", "3x3", "--time", "24", "-o", "plan.csv"]) == 0
+    made_by_hand, record = by_hand(*calls.plan("axebot", [3.0, 3.0], 24.0, "", "log.csv"))
+    assert str(made_by_hand.verdict).lower() == made["verdict"].lower().removesuffix(".")
+    assert record.is_complete
     assert (tmp_path / "plan.csv").read_bytes() == (folder / job.PROGRAM).read_bytes()
-    assert main(["drive", "plan.csv", "-o", "log.csv"]) == 0
     told, result, log = drive(planned, tmp_path)
     assert result["complete"]
-    whole, by_hand = omnidyn.read_log(log, ROBOT), omnidyn.read_log("log.csv", ROBOT)
+    whole, written = omnidyn.read_log(log, ROBOT), omnidyn.read_log("log.csv", ROBOT)
     for name in ("t", "voltage", "wheel_speed"):
-        np.testing.assert_array_equal(getattr(whole, name), getattr(by_hand, name))
+        np.testing.assert_array_equal(getattr(whole, name), getattr(written, name))
         parts = [rows[name] for kind, rows in told if kind == "rows"]
         np.testing.assert_allclose(np.concatenate(parts), getattr(whole, name), atol=1e-6)  # as a file has them
     *_, (rows, x, y, heading) = (place for kind, place in told if kind == "frame")
@@ -192,8 +194,9 @@ def test_a_plan_is_driven_from_a_page_and_its_logs_can_be_fitted(tmp_path):
             await held_until(planned, page, lambda: planned.stage == DONE)
             await finished(lambda: not session.workers["plan"].busy)
             assert planned.trouble == ""
-            forward = [number for number in planned.status["numbers"] if number["key"].endswith("[0]")]
-            assert [number["reached"] for number in forward] == [True, True]
+            assert {number["key"] for number in planned.status["numbers"]} == {*planned.last.result["promises"]}
+            driven = sum(omnidyn.read_log(path, ROBOT).t[-1] for path in planned.logs)
+            assert planned.status["seconds"] > driven - 1.0  # all that was driven is told, with an answer each second
             logs = [log for log in session.logs.values() if log.name.startswith("planned-")]
             assert len(logs) >= 2
             await finished(lambda: all(log.result is not None for log in logs))

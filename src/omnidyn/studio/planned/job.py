@@ -108,7 +108,7 @@ def drive_plan(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[st
         result["log"] = request["log"]
     if not record.is_complete:
         try:
-            result["left"] = course(rest_of(program, [record.run] if result["log"] else []))
+            result["left"] = course(rest_of(program, [record.run] if record.run is not None and result["log"] else []))
         except (InputError, InsufficientDataError) as error:  # the log is written all the same
             result["remedy"] = str(error)
     return result
@@ -168,7 +168,8 @@ class _Teller:
 
 
 def _run(rows: Mapping[str, Any]) -> Run:
-    return Run(source="drive", **{name: np.array(values, dtype=float) for name, values in rows.items()})
+    channels: dict[str, Any] = {name: np.array(values, dtype=float) for name, values in rows.items()}
+    return Run(source="drive", **channels)
 
 
 def _connection(request: Mapping[str, Any], program: DriveProgram) -> RobotConnection:
