@@ -61,7 +61,7 @@ def test_the_fit_of_its_log_is_as_sure_as_it_was_told(made):
     """Of robots 30 % off: what identify says of each number beside its truth, and beside the prediction."""
     rng = np.random.default_rng(3)
     z, halves = [], []
-    for _ in range(10):
+    for _ in range(20):
         robot = off(made.robot, rng)
         run = driven(robot, made.commands())
         log = omnidyn.Run(
