@@ -99,7 +99,7 @@ def draw_numbers(folder: Path) -> Figure:
     axes.set_yticks(range(len(TRUE)), [in_words(name) for name in TRUE])
     axes.set_ylim(len(TRUE) - 0.5, -0.5)
     axes.set_xlim(-5.0, AT_REST + 1.0)
-    axes.set_xlabel("off the truth, %, with 95 % intervals; grey: true friction, from full speed to next to rest")
+    axes.set_xlabel("off the truth, %; grey: true friction, at speed to next to rest")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, borderaxespad=0.1)
     return figure
 
@@ -123,9 +123,13 @@ def draw_eight(folder: Path) -> Figure:
     right.set_yscale("log")
     right.set_ylim(0.1, 200.0)
     right.set_yticks([0.1, 1, 10, 100], ["0.1", "1", "10", "100"])
+    right.set_xlim(0.0, 12.0)
+    right.set_xticks(range(0, 13, 3))
     right.set_xlabel("time, s")
     right.set_ylabel("off the path, mm")
-    figure.legend(*left.get_legend_handles_labels(), loc="upper left", bbox_to_anchor=(0.07, 1.0), ncols=3, frameon=False)
+    figure.legend(
+        *left.get_legend_handles_labels(), loc="upper left", bbox_to_anchor=(0.07, 1.0), ncols=3, frameon=False
+    )
     return figure
 
 
