@@ -10,7 +10,9 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import axis_patterns
+from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import wheel_speed
 
 FORWARD, SIDEWAYS, TURN = "forward", "sideways", "turn"
 DIRECTIONS: dict[str, tuple[float, float, float]] = {  # share of the pattern of each axis
@@ -65,7 +67,7 @@ class PlannedMove:
     def _driven(self, way: tuple[float, float, float], robot: Robot, dt: float) -> FloatArray:
         rows = max(round(self.seconds / dt), 1)
         shape = SHAPES[self.shape]((np.arange(rows) + 0.5) / rows)
-        pattern = np.array(way) @ axis_patterns(robot)
+        pattern = np.array(way) @ _patterns(robot)
         driven = self.level * shape[:, None] * (pattern / np.abs(pattern).max())
         return np.concatenate([driven, np.zeros((round(self.rest / dt), driven.shape[1]))])
 
@@ -75,6 +77,14 @@ class PlannedMove:
             return self.input(robot, dt)
         ways = [self._driven(way, robot, dt) for way in self._ways]
         return np.concatenate([rows for once in ways for rows in (once, -once)])
+
+
+def _patterns(robot: Robot) -> FloatArray:
+    """Inputs that move it along each axis alone, the largest 1: of volts, or of speeds. Shape (3, wheels)."""
+    if robot.drive.kind != SPEED:
+        return axis_patterns(robot)
+    speeds = wheel_speed(robot.wheels, np.eye(3))
+    return speeds / np.abs(speeds).max(axis=1, keepdims=True)
 
 
 def all_moves() -> list[PlannedMove]:

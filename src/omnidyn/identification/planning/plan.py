@@ -17,12 +17,11 @@ from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.problem.nuisances import PUSH, TILT
 from omnidyn.identification.planning.aims import NEXT, PlanAim, aim_of, fitted_keys, known_of, without_priors
 from omnidyn.identification.planning.information import Prediction, information_of, told_by
-from omnidyn.identification.planning.limits import GRIP, PlanLimits, limits_of, refuse_set_points
+from omnidyn.identification.planning.limits import GRIP, PlanLimits, limits_of
 from omnidyn.identification.planning.moves import FORWARD, RAMP, SIDEWAYS, STEP, TURN, PlannedMove, all_moves
-from omnidyn.identification.planning.planned import Plan, Predicted
-from omnidyn.identification.planning.recorded import Noise, driven, noise_of, recorded
+from omnidyn.identification.planning.planned import UNITS, Plan, Predicted
+from omnidyn.identification.planning.recorded import Noise, driven, largest_input, noise_of, recorded
 from omnidyn.identification.planning.search import ROOM, UNKNOWN, TriedMove, chosen, fitting, tried
-from omnidyn.model.drive import DUTY
 from omnidyn.model.keys import COULOMB, Key, expand, find_key, friction_keys, with_priors
 from omnidyn.model.known.told import numbers_told
 from omnidyn.model.robot import Robot
@@ -84,7 +83,7 @@ def plan(
             traction=, force of a wheel over what it carries; default: 0.8 of the grip of wheels that may slip.
 
     Raises InputError for a room, a time, a limit or a noise that cannot be, for an aim that is not free, and for "next"
-    of a robot that was not identified; UnsupportedError for a robot whose firmware holds the speeds of its wheels;
+    of a robot that was not identified;
     InsufficientDataError where no move is left, or no log of these channels tells two explanations apart.
 
     >>> import omnidyn
@@ -96,7 +95,6 @@ def plan(
     width, depth = _room(area)
     _check("seconds", seconds, SHORTEST, LONGEST, "s")
     _check("rate", rate, SLOWEST, FASTEST, "Hz")
-    refuse_set_points(robot)
     goal = aim_of(aim, robot)
     question = _question(robot, free, goal)
     planner = replace(_planner(robot, 1.0 / rate, noise, question, limits), aim=goal)
@@ -279,15 +277,13 @@ class _Planner:
             )
             for name, value, variance in zip(names, values.value, before, strict=False)
         }
-        is_duty = self.robot.drive.kind == DUTY
-        limit = np.ones(1) if is_duty else np.broadcast_to(self.robot.motor.voltage_limit, self.robot.wheels.count)
         return Plan(
             self.robot,
             self.dt,
             made.share,
             made.held_out,
-            DUTY if is_duty else "V",
-            limit,
+            UNITS.get(self.robot.drive.kind, "V"),
+            largest_input(self.robot),
             made.moves,
             area,
             reach,
@@ -359,13 +355,14 @@ def _robots(robot: Robot) -> list[Robot]:
     """Robots that may be meant: by the std of the file, else with friction and torque up to 30 % off.
 
     A Coulomb friction that is a guess is drawn as a factor: none of them is without it, which would roll on for seconds
-    after each move.
+    after each move. Nor are the gains of a speed loop drawn: its firmware was tuned so that it holds speeds.
     """
     guesses = {key: prior for key, prior in numbers_told(robot).items() if prior.guessed and prior.std}
     dry = {key: prior for key, prior in guesses.items() if Key.parse(key).level == COULOMB}
     most = {key: FACTOR * abs(float(Key.parse(key).get(robot))) for key in dry}
     narrower = {key: prior.replace(std=min(prior.std or 0.0, most[key])) for key, prior in dry.items() if most[key]}
-    robot = with_priors(robot, narrower)
+    loop = {key: prior.replace(std=None) for key, prior in numbers_told(robot).items() if key.startswith("drive.")}
+    robot = with_priors(robot, narrower | loop)
     try:
         return list(sample(robot, DRAWS, SEED))
     except InsufficientDataError:
