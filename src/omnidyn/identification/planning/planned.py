@@ -53,7 +53,7 @@ class Plan(Displayable):
     """A program of moves, and what it will tell.
 
     robot: it is made for. dt [s]: of a row. share (rows, wheels), held_out (rows, wheels): the input of the program and
-    of a second one to judge the fit by, as shares of the largest input; `limit` is that input, in `unit`: V, duty or rad/s.
+    of a second one to judge the fit by, as shares of the largest input; `limit` is that, in `unit`: V, duty or rad/s.
     moves: (start [s], move) of the program. area [m], reach [m]: the room, and how far it goes along x and y at most,
     of all robots drawn. predicted: key -> what will be known. noise: channel -> std of what is recorded, of
     wheel_angle the step of a count [rad]. robots: how many were drawn. blind: what no log of these channels shows, and
