@@ -160,8 +160,7 @@ def test_the_page_as_it_stands(tmp_path, monkeypatch, capsys):
         assert line.dead_band == pytest.approx(Uneven.band[way, line.wheel - 1], abs=0.03)
     gains = [line.gain for line in omnidyn.wheel_table(scope["straight"].run, LEKIWI).lines]
     assert 0.98 < min(gains) <= max(gains) < 1.02
-    print(worst(robot, scope))
-    assert worst(robot, scope) < 0.01
+    assert worst(robot, scope) < 0.005
 
 
 def worst(robot, scope):
