@@ -113,11 +113,15 @@ class Uneven(Base):
 
 
 class Watched(Uneven):
-    """It notes where it is."""
+    """It notes where it is, and is put back into the middle before each drive."""
 
     def __init__(self, clock):
         super().__init__(clock)
         self.places = []
+
+    def connect(self, calibrate=True):
+        super().connect(calibrate)
+        self.live, self.acting, self.time = LiveRobot(LEKIWI, DT), np.zeros(3), self.clock.now()
 
     def send_action(self, action):
         super().send_action(action)
