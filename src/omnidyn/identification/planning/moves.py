@@ -64,10 +64,10 @@ class PlannedMove:
         """Share of the largest input, rows of dt [s], shape (rows, wheels): the move and its rest, no mirror image."""
         return self._driven(self._ways[0], robot, dt)
 
-    def _driven(self, way: tuple[float, float, float], robot: Robot, dt: float) -> FloatArray:
+    def _driven(self, shares: tuple[float, float, float], robot: Robot, dt: float) -> FloatArray:
         rows = max(round(self.seconds / dt), 1)
         shape = SHAPES[self.shape]((np.arange(rows) + 0.5) / rows)
-        pattern = np.array(way) @ _patterns(robot)
+        pattern = np.array(shares) @ _patterns(robot)
         driven = self.level * shape[:, None] * (pattern / np.abs(pattern).max())
         return np.concatenate([driven, np.zeros((round(self.rest / dt), driven.shape[1]))])
 
@@ -75,7 +75,7 @@ class PlannedMove:
         """The same with the mirror image, where there is one."""
         if self.one_way:
             return self.input(robot, dt)
-        ways = [self._driven(way, robot, dt) for way in self._ways]
+        ways = [self._driven(shares, robot, dt) for shares in self._ways]
         return np.concatenate([rows for once in ways for rows in (once, -once)])
 
 

@@ -266,8 +266,8 @@ class _Planner:
         apart = self._apart(values)
         names = values.names[: values.robot_count]
         halves = {name: 2.0 * np.array([one.of(name) for one in predictions]) for name in names}
-        known = self._known(names)
-        before = np.where(np.diag(known) > 0.0, np.diag(np.linalg.pinv(known, hermitian=True)), 0.0)
+        earlier = self._known(names)
+        before = np.where(np.diag(earlier) > 0.0, np.diag(np.linalg.pinv(earlier, hermitian=True)), 0.0)
         predicted = {
             name: Predicted(
                 float(value),

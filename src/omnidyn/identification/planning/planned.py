@@ -115,9 +115,9 @@ class Plan(Displayable):
             "seconds": self.seconds,
         }
         if self.aim.criterion == NEXT:
-            told = [name for name in self.predicted if name in self.aim.keys] or list(self.predicted)
-            widest = max(told, key=lambda name: self.predicted[name].half)
-            before = max(told, key=lambda name: self.predicted[name].before)
+            counted = [name for name in self.predicted if name in self.aim.keys] or list(self.predicted)
+            widest = max(counted, key=lambda name: self.predicted[name].half)
+            before = max(counted, key=lambda name: self.predicted[name].before)
             numbers |= {"widest": widest, "share": self.predicted[widest].half}
             numbers |= {"before": before, "known": self.predicted[before].before}
             return Statement("planned_next", NOTE, self.robot.name, numbers)
