@@ -233,9 +233,7 @@ def setting_off(problem: Problem) -> Problem:
 
 
 def _last_of_start(piece: Piece) -> int:
-    assert piece.record.set_point is not None
-    asked_rows = np.flatnonzero(piece.record.set_point[piece.first : piece.last + 1].any(axis=1))
-    first = piece.first + int(asked_rows[0] if len(asked_rows) else 0)
+    first = piece.first + piece.rest_rows
     late = int(np.searchsorted(piece.record.t, piece.record.t[first] + SETTING_OFF))
     return min(piece.last, max(late, first + LEAST_ROWS))
 
