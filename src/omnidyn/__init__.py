@@ -66,6 +66,7 @@ _HOME = {
     "read_log": "omnidyn.logs.read_log",
     "read_program": "omnidyn.driving.program_file",
     "read_steady_table": "omnidyn.logs.steady_table",
+    "read_wheel_table": "omnidyn.logs.wheel_table",
     "sample": "omnidyn.simulation.batch.sample",
     "save_robot": "omnidyn.model.robot_file",
     "simulate": "omnidyn.simulation.simulate",
@@ -76,6 +77,7 @@ _HOME = {
     "tune": "omnidyn.control.tune",
     "vary_robot": "omnidyn.model.vary",
     "voltage_for": "omnidyn.control.feedforward",
+    "wheel_table": "omnidyn.logs.wheel_table",
     "write_run": "omnidyn.logs.run_file",
 }
 
@@ -115,6 +117,7 @@ if TYPE_CHECKING:
     from omnidyn.logs.read_log import read_log
     from omnidyn.logs.run_file import write_run
     from omnidyn.logs.steady_table import read_steady_table
+    from omnidyn.logs.wheel_table import read_wheel_table, wheel_table
     from omnidyn.model.dynamics import acceleration, state_space
     from omnidyn.model.known.dead_zone import dead_zone
     from omnidyn.model.robot import Robot

@@ -482,6 +482,29 @@ def test_radii_of_each_wheel_and_the_loop_of_the_firmware(call, here):
     assert {robot.priors[f"drive.{key}"].origin for key in ("kp_V_s_rad", "ki_V_rad", "rate_Hz")} == {"given"}
 
 
+def test_a_drive_that_takes_duties_and_its_supply(call, here):
+    assert call("init", "pulsed", *MINI, "--supply", "11.1")[0] == 0
+    robot = load_robot(here / "pulsed.toml")
+    assert (robot.drive.kind, robot.drive.supply, robot.motor.voltage_limit) == ("duty", 11.1, 11.1)
+    assert {robot.priors[key].origin for key in ("drive.supply_V", "motor.voltage_limit_V")} == {"given"}
+    assert call("init", "less", *MINI, "--supply", "11.1", "--voltage-limit", "9")[0] == 0
+    assert load_robot(here / "less.toml").motor.voltage_limit == 9.0
+
+
+@pytest.mark.parametrize(
+    ("more", "code", "words"),
+    [
+        (["--supply", "0"], 3, "--supply: no motor turns at this voltage; got 0 V"),
+        (["--supply", "12", "--speed-loop", "100"], 2, "give one of them"),
+        (["--supply", "12", "--like", "axebot"], 2, "--supply is for a guess"),
+    ],
+)
+def test_a_supply_that_cannot_be(call, here, more, code, words):
+    got, out, err = call("init", "mini", *MINI, *more)
+    assert (got, out) == (code, "")
+    assert re.search(words, err)
+
+
 def test_gains_that_nobody_gave_are_guesses(call, here):
     assert call("init", "looped", *MINI, "--speed-loop", "100")[0] == 0
     robot = load_robot(here / "looped.toml")
@@ -505,7 +528,10 @@ def test_an_existing_file_is_refused_before_any_question(typed, here):
 TEXT = st.text(max_size=12)
 NUMBER = st.floats().map(repr) | st.integers().map(str) | TEXT
 FLAGS = st.one_of(
-    st.tuples(st.sampled_from(["--wheels", "--wheel-radius", "--robot-radius", "--mass", "--voltage-limit"]), NUMBER),
+    st.tuples(
+        st.sampled_from(["--wheels", "--wheel-radius", "--robot-radius", "--mass", "--voltage-limit", "--supply"]),
+        NUMBER,
+    ),
     st.tuples(st.just("--azimuth"), st.lists(NUMBER, max_size=5).map(",".join) | TEXT),
     st.tuples(st.just("--like"), st.sampled_from(["axebot", "robotino", "four-wheel"]) | TEXT),
     st.tuples(st.just("--friction"), st.sampled_from(["axes", "direction"]) | TEXT),

@@ -48,6 +48,7 @@ PUBLIC = [
     "read_log",
     "read_program",
     "read_steady_table",
+    "read_wheel_table",
     "sample",
     "save_robot",
     "simulate",
@@ -58,6 +59,7 @@ PUBLIC = [
     "tune",
     "vary_robot",
     "voltage_for",
+    "wheel_table",
     "write_run",
 ]
 

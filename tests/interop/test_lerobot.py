@@ -1,12 +1,15 @@
 """A robot of LeRobot is driven: a class with the methods of LeRobot's `Robot`, over our simulation."""
 
 import re
+import shlex
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import omnidyn
+from omnidyn.cli import main
 from omnidyn.driving.clock import SimulatedClock
 from omnidyn.errors import InputError
 from omnidyn.interop.lerobot import LeRobotConnection
@@ -96,17 +99,79 @@ def test_what_is_no_base_is_refused():
         LeRobotConnection(Arm(clock), LEKIWI, clock.now).open()
 
 
+class Uneven(Base):
+    """Its wheels turn as in XLeRobot #123: asked for -3000 and +3000 steps a second they reach -2350 and +3050."""
+
+    gain = np.array([[1.017, 1.0, 0.95], [0.783, 0.9, 1.0]])  # forward, backward
+    band = np.array([[0.1, 0.0, 0.05], [0.15, 0.1, 0.0]])  # [rad/s]
+
+    def send_action(self, action):
+        super().send_action(action)
+        gain, band = (np.where(self.acting < 0.0, both[1], both[0]) for both in (self.gain, self.band))
+        self.acting = np.sign(self.acting) * gain * np.maximum(np.abs(self.acting) - band, 0.0)
+        return action
+
+
+class Watched(Uneven):
+    """It notes where it is, and is put back into the middle before each drive."""
+
+    def __init__(self, clock):
+        super().__init__(clock)
+        self.places = []
+
+    def connect(self, calibrate=True):
+        super().connect(calibrate)
+        self.live, self.acting, self.time = LiveRobot(LEKIWI, DT), np.zeros(3), self.clock.now()
+
+    def send_action(self, action):
+        super().send_action(action)
+        self.places.append((self.clock.now(), *self.live.pose[:2]))
+        return action
+
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "how-to" / "lekiwi.md").read_text("utf-8")
+
+
 def test_the_page_as_it_stands(tmp_path, monkeypatch, capsys):
-    """The Python of docs/how-to/lekiwi.md drives a simulated LeKiwi, on a simulated clock."""
+    """Plan, drive, record, table, loop: all of docs/how-to/lekiwi.md, on a simulated LeKiwi and its clock."""
     monkeypatch.chdir(tmp_path)
     clock = SimulatedClock()
     monkeypatch.setattr("omnidyn.driving.drive.RealClock", lambda: clock)
     monkeypatch.setattr(
         "omnidyn.interop.LeRobotConnection", lambda r, m: LeRobotConnection(r, m, clock.now), raising=False
     )
-    page = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "lekiwi.md"
-    (code,) = re.findall(r"^```python\n(.*?)^```$", page.read_text("utf-8"), re.DOTALL | re.MULTILINE)
-    scope = {"robot": Base(clock)}
-    exec(code, scope)
+    robot = Watched(clock)
+    scope, said = {"robot": robot}, ""
+    for code, line in re.findall(
+        r"^```python\n(.*?)^```$|^    omnidyn ((?:plan|drive|check log)[^\n]*)$", PAGE, re.DOTALL | re.MULTILINE
+    ):
+        if line:
+            assert main(shlex.split(line)) == 0, (line, capsys.readouterr().err)
+            said = said + capsys.readouterr().out
+            continue
+        robot.places.clear()
+        with monkeypatch.context() as patched:
+            patched.setattr(time, "monotonic", clock.now)
+            patched.setattr(time, "sleep", lambda seconds: clock.sleep_until(clock.now() + seconds))
+            exec(code, scope)
     assert scope["record"].is_complete, str(scope["record"].verdict)
-    assert len(omnidyn.read_log("lekiwi.csv", robot=LEKIWI)) > 1000
+    assert scope["straight"].is_complete, str(scope["straight"].verdict)
+    assert len(omnidyn.read_log("log-plan.csv", robot=LEKIWI)) > 1000
+    assert "Wheels turn 0.78 to 1.01 times as fast as asked" in said
+    for line in scope["table"].lines:
+        way = 0 if line.direction > 0 else 1
+        assert line.gain == pytest.approx(Uneven.gain[way, line.wheel - 1], rel=0.02)
+        assert line.dead_band == pytest.approx(Uneven.band[way, line.wheel - 1], abs=0.03)
+    gains = [line.gain for line in omnidyn.wheel_table(scope["straight"].run, LEKIWI).lines]
+    assert 0.98 < min(gains) <= max(gains) < 1.02
+    assert worst(robot, scope) < 0.005
+
+
+def worst(robot, scope):
+    """How far it was off the path [m], after the start."""
+    t, *place = np.array(robot.places).T
+    path, start = scope["path"], scope["start"]
+    wanted = np.array([path.at(now).pose[:2] for now in t - start])
+    place = np.array(place).T - np.array(place).T[0] + wanted[0]
+    late = (t - start > 2.0) & (t - start < path.duration)
+    return float(np.hypot(*(place - wanted)[late].T).max())

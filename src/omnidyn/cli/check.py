@@ -18,6 +18,7 @@ from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import painted, say, show, show_json, width
 from omnidyn.errors import InputError, OmnidynError
+from omnidyn.files import check_output
 from omnidyn.progress import Progress, Report
 from omnidyn.statement import WARNING
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from omnidyn.findings.finding import Verdict
     from omnidyn.logs.log import Log
     from omnidyn.logs.read_log import LogOptions
+    from omnidyn.logs.wheel_table import WheelTable
     from omnidyn.model.robot import Robot
     from omnidyn.statement import Statement
 
@@ -50,6 +52,12 @@ def check(
     log: list[str] = log_options.LOGS,
     robot: str = typer.Option("", "--robot", metavar="ROBOT", help="The robot of the logs: a preset or a robot file."),
     picture: str = typer.Option("", "--picture", metavar="FILE", help="The raw log with what was found, .png or .svg."),
+    wheel_table: str = typer.Option(
+        "",
+        "--wheel-table",
+        metavar="FILE",
+        help="Table by which wheels turn as asked, of all logs, .csv; with --robot.",
+    ),
     full: bool = typer.Option(False, "--full", help="Every finding of every log, notes too."),
     flags: LogFlags = NO_FLAGS,
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
@@ -64,16 +72,25 @@ def check(
     """
     if picture and (len(log) > 1 or os.path.isdir(log[0])):
         raise InputError("a picture shows one log", got=" ".join(log), expected="one file", where="--picture")
+    if wheel_table and not robot:
+        raise InputError("a table of wheels needs the robot", expected="--robot ROBOT", where="--wheel-table")
     refuse_picture(picture, force)
-    files = log_options.keep_inputs(log, [robot], [flags.map_file], picture, flags.save_map)
+    if wheel_table:
+        check_output(wheel_table, force)
+    files = log_options.keep_inputs(log, [robot], [flags.map_file], picture, flags.save_map, wheel_table)
     if len(log) == 1:
         log_options.refuse_missing(files)
     options, maps = flags.options(), flags.maps(force)
     with shown_progress("reading") as progress:
         loaded = omnidyn.load_robot(robot) if robot else None
         checked_logs = [_checked(path, loaded, options, maps, progress, bool(picture)) for path in files]
+        table = None
+        if wheel_table and loaded is not None:
+            runs = [one.to_run() for _, one in log_options.load_logs(files, loaded, options)]
+            table = omnidyn.wheel_table(runs, loaded)
+            table.write(wheel_table, force)
     _compare_data(checked_logs)
-    _tell(checked_logs, json, full, robot)
+    _tell(checked_logs, json, full, robot, table)
     if picture:
         _draw(checked_logs[0], picture, force)
     if any(log.error is not None for log in checked_logs):
@@ -173,14 +190,14 @@ def _compare_data(checked_logs: list[CheckedLog]) -> None:
             log.verdict = replace(log.verdict, findings=in_order([*log.verdict.findings, finding]))
 
 
-def _tell(checked_logs: list[CheckedLog], json: bool, full: bool, robot: str) -> None:
+def _tell(checked_logs: list[CheckedLog], json: bool, full: bool, robot: str, table: WheelTable | None) -> None:
     for log in checked_logs:
         if log.error is not None:
             say(f"omnidyn: error: {log.error}")
         for note in log.notes if full or len(checked_logs) == 1 else ():
             say(f"omnidyn: {log.path}: {note}")
     if json:
-        show_json(_document(checked_logs, robot))
+        show_json(_document(checked_logs, robot) | ({"wheel_table": table.to_dict()["wheels"]} if table else {}))
         return
     from omnidyn.telling import log_verdict
 
@@ -192,7 +209,7 @@ def _tell(checked_logs: list[CheckedLog], json: bool, full: bool, robot: str) ->
         documents += [verdict.document() for verdict in read]
     elif len(checked_logs) == 1:
         documents += [log_verdict.in_brief(verdict, width()) for verdict in read]
-    for document in documents:
+    for document in [*documents, *([table.document()] if table else [])]:
         show(document.to_text(width(), painted))
 
 

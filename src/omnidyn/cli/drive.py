@@ -21,8 +21,10 @@ from omnidyn.errors import InputError
 from omnidyn.files import check_output
 
 if TYPE_CHECKING:
+    from omnidyn.driving.connection import RobotConnection
     from omnidyn.driving.program import DriveProgram
     from omnidyn.driving.record import DriveRecord
+    from omnidyn.logs.wheel_table import WheelTable
     from omnidyn.model.robot import Robot
 
 SIM, STDOUT = "sim", "-"
@@ -52,6 +54,12 @@ def drive(
     seed: int = typer.Option(0, min=0, help="Of the noise of a simulated robot."),
     dead_man: float = typer.Option(0.25, metavar="S", help="After a stop no motor gets anything longer than that [s]."),
     supply: float | None = typer.Option(None, metavar="V", help="Stop below; default: 0.75 of that in the robot file."),
+    wheel_table: str = typer.Option(
+        "",
+        "--wheel-table",
+        metavar="FILE",
+        help="Ask for what makes the wheels turn as planned: of check --wheel-table.",
+    ),
     hold: bool = typer.Option(False, "--hold", help="Drive only while a key is held down in the terminal."),
     dry_run: bool = typer.Option(False, "--dry-run", help="Show what would be driven, and send nothing."),
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
@@ -68,7 +76,8 @@ def drive(
 
     if out and to not in KINDS:
         check_output(out, force)
-    keep_inputs([], [robot, plant], [plan, *resume], out)
+    keep_inputs([], [robot, plant], [plan, wheel_table, *resume], out)
+    table = _table(wheel_table, to == SIM or to in KINDS) if wheel_table else None
     program = read_program(plan, omnidyn.load_robot(robot) if robot else None, _sizes(area) if area else None)
     inputs = [input_file("plan", plan), *([robot_input(robot)] if robot else [])]
     if resume:
@@ -88,9 +97,8 @@ def drive(
         return
     if to != SIM and not out:
         raise InputError("nowhere to record the drive", got="no file", expected="-o LOG", where="-o")
-    driven = _drive(
-        program, plan, to, omnidyn.load_robot(plant) if plant else program.robot, seed, (dead_man, supply), hold
-    )
+    truth = omnidyn.load_robot(plant) if plant else program.robot
+    driven = _drive(program, plan, to, truth, seed, (dead_man, supply), hold, table)
     if out and driven.run is not None:
         omnidyn.write_run(driven.run, out, force=force)
     if to == STDOUT:
@@ -105,8 +113,27 @@ def drive(
         end_failed(driven.verdict)
 
 
+def _table(path: str, is_unused: bool) -> WheelTable:
+    """The table of wheels in a file. Raises InputError where nothing is sent by it."""
+    if is_unused:
+        raise InputError(
+            "a table of wheels is for a robot that is driven from here",
+            got="another --to",
+            expected="serial:PORT, udp:HOST:PORT or -",
+            where="--wheel-table",
+        )
+    return omnidyn.read_wheel_table(path)
+
+
 def _drive(
-    program: DriveProgram, plan: str, to: str, truth: Robot, seed: int, stops: tuple[float, float | None], hold: bool
+    program: DriveProgram,
+    plan: str,
+    to: str,
+    truth: Robot,
+    seed: int,
+    stops: tuple[float, float | None],
+    hold: bool,
+    table: WheelTable | None,
 ) -> DriveRecord:
     """The drive, with a simulated robot or a real one."""
     from omnidyn.driving.drive import drive as run
@@ -114,6 +141,7 @@ def _drive(
     from omnidyn.driving.program_file import plan_beside
     from omnidyn.driving.senders import sender
     from omnidyn.driving.simulated import SimulatedRobot
+    from omnidyn.driving.tabled import TabledConnection
 
     limits = Limits(stops[0], stops[0], stops[1])
     if (truth.wheels.count, truth.drive.kind) != (program.robot.wheels.count, program.robot.drive.kind):
@@ -124,7 +152,8 @@ def _drive(
             beside = plan_beside(plan)
             robot = SimulatedRobot(truth, beside.noise if beside else None, rate=1.0 / program.dt, seed=seed)
             return run(program, robot, limits=limits, progress=progress)
-        connection = sender(to, program.robot.wheels.count)
+        connection: RobotConnection = sender(to, program.robot.wheels.count)
+        connection = connection if table is None else TabledConnection(connection, table)
         with _held(hold) as held:
             return run(program, connection, limits=limits, held=held, progress=progress)
 

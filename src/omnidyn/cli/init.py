@@ -44,6 +44,9 @@ def init(
     speed_loop: str = typer.Option(
         "", metavar="[KP,KI,]HZ", help="The firmware holds wheel speeds: V s/rad, V/rad, ticks a second."
     ),
+    supply: float | None = typer.Option(
+        None, metavar="V", help="The drive takes duties (PWM), -1 to 1 of this supply [V]; default: it takes volts."
+    ),
     flags: LogFlags = NO_FLAGS,
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="File to write instead; - is stdout."),
     force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
@@ -62,6 +65,7 @@ def init(
         "mass": mass,
         "voltage_limit": voltage_limit,
         "speed_loop": _listed("speed_loop", speed_loop),
+        "supply": supply,
         "gear_ratio": gear_ratio,
         "rotor_inertia": rotor_inertia,
     }
@@ -90,16 +94,19 @@ def _refuse_words(values: dict[str, Any], mecanum: bool, friction: str, like: st
         raise typer.BadParameter(f"--azimuth has {len(azimuth)} values for --wheels {count}.")
     if friction not in ("", "direction", "axes"):
         raise typer.BadParameter("--friction is direction or axes.")
-    for flag in ("--friction",) * bool(friction) + ("--speed-loop",) * bool(values["speed_loop"]):
+    given = {"--friction": friction, "--speed-loop": values["speed_loop"], "--supply": values["supply"] is not None}
+    for flag in (flag for flag, value in given.items() if value):
         if like:
             raise typer.BadParameter(f"{flag} is for a guess; with --like it comes from there.")
+    if values["speed_loop"] and values["supply"] is not None:
+        raise typer.BadParameter("--speed-loop takes speeds, --supply duties: give one of them.")
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
 
 
 def _refuse_numbers(values: dict[str, Any]) -> None:
     """Numbers with which no robot can be guessed, by the names that they have here. Raises InputError."""
-    azimuth, limit, loop = values["azimuth"], values["voltage_limit"], values["speed_loop"]
+    azimuth, loop = values["azimuth"], values["speed_loop"]
     count = values["wheels"] or (azimuth and len(azimuth))
     for key in ("wheel_radius", "robot_radius"):
         if count and isinstance(values[key], tuple) and len(values[key]) != count:
@@ -123,14 +130,15 @@ def _refuse_numbers(values: dict[str, Any]) -> None:
             expected=f"{LEAST_WHEELS} to {MOST_WHEELS}, one per wheel, such as 60,180,300",
             where="--azimuth",
         )
-    if limit is not None and not 0.0 < limit < float("inf"):
-        raise InputError(
-            "no motor turns at this voltage",
-            got=f"{limit:g} V",
-            expected="more than 0 V, such as 12",
-            remedy="leave it out for a guess",
-            where="--voltage-limit",
-        )
+    for key, otherwise in (("voltage_limit", "for a guess"), ("supply", "for a drive that takes volts")):
+        if (volts := values[key]) is not None and not 0.0 < volts < float("inf"):
+            raise InputError(
+                "no motor turns at this voltage",
+                got=f"{volts:g} V",
+                expected="more than 0 V, such as 12",
+                remedy=f"leave it out {otherwise}",
+                where=f"--{key.replace('_', '-')}",
+            )
     gear = values["gear_ratio"]
     if gear is not None and not 0.0 < gear < float("inf"):
         raise InputError(

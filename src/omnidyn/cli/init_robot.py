@@ -233,7 +233,13 @@ def _guessed_robot(name: str, answers: Answers, preset: Robot | None, mecanum: b
             robot = like(preset, name, wheels, mass, value.get("voltage_limit"), given_keys)
         else:
             robot = first_guess(
-                name, wheels, mass, value.get("voltage_limit"), friction or DIRECTION, value.get("speed_loop", ())
+                name,
+                wheels,
+                mass,
+                value.get("voltage_limit"),
+                friction or DIRECTION,
+                value.get("speed_loop", ()),
+                value.get("supply"),
             )
     except InputError as error:
         raise InputError(

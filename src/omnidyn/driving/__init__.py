@@ -4,5 +4,6 @@ program (what is to be driven, leg by leg: words, pictures and commands come fro
 writes it), connection (the protocol between a program and a robot), dead_man (which command acts: the robot's side),
 clock (time, real or simulated), guard (when to stop; odometry: where it is), recording (what was sent and measured, as
 a log), drive (the door), record (the result), resume (what is left after a stop), simulated (a robot that may
-misbehave), wire (lines of text), senders (lines over standard output, UDP or a serial port).
+misbehave), tabled (wheels that do not turn as asked), wire (lines of text), senders (lines over standard output, UDP
+or a serial port).
 """

@@ -19,6 +19,7 @@ from omnidyn.statement import WARNING, Statement
 WINDOW = 0.3  # [s] of travel that is compared
 FOLLOWS_WITHIN = 0.2  # [s] later than predicted, at the latest
 MOVING = 0.25  # of the longest travel of a wheel in a window of the program: less is not judged
+ONE_WAY = 0.9  # of the predicted travel of a wheel, to and fro: else it turns round in the window, and is not judged
 FOLLOWS = 0.2  # of the predicted travel: a wheel that turns less does not follow
 SLIPS_FOR = 0.15  # [s]: a slip that ends sooner is noise of a sensor
 SLIPS = 0.5  # of the travel: by so much wheels and body may differ
@@ -67,6 +68,8 @@ class DriveGuard:
         self._slips_since = np.full(program.robot.wheels.count, np.inf)  # time of each wheel [s]
         self._predicted = np.zeros_like(speed)
         np.cumsum(0.5 * program.dt * (speed[1:] + speed[:-1]), axis=0, out=self._predicted[1:])
+        self._distance = np.zeros_like(speed)
+        np.cumsum(0.5 * program.dt * np.abs(speed[1:] + speed[:-1]), axis=0, out=self._distance[1:])
         self._back = max(round(WINDOW / program.dt), 1)
         self._judged = MOVING * np.abs(self._way(np.arange(len(speed)))).max(axis=0)
         supply = program.robot.drive.supply
@@ -132,8 +135,11 @@ class DriveGuard:
         turned = next(iter(went.values()))
         row = round((self._travel[next(iter(went))].time - self.start) / self.program.dt)
         rows = np.arange(row - round(FOLLOWS_WITHIN / self.program.dt), row + 1)
-        wanted = self._way(np.clip(rows, 0, len(self._predicted) - 1))
+        rows = np.clip(rows, 0, len(self._predicted) - 1)
+        wanted = self._way(rows)
+        distance = self._distance[rows] - self._distance[np.maximum(rows - self._back, 0)]
         one_way = np.abs(np.sign(wanted).sum(axis=0)) == len(rows)
+        one_way &= (np.abs(wanted) >= ONE_WAY * distance).all(axis=0)
         least = np.abs(wanted).min(axis=0) * np.sign(wanted[-1])
         along = turned * np.sign(least)
         bad = np.flatnonzero(one_way & (np.abs(least) > self._judged) & (along < FOLLOWS * np.abs(least)))

@@ -10,6 +10,7 @@ steady window as one point, a window so many rows or seconds; a block is a part 
 leave notes (what was decided) and doubts (what was left open); a Run and an Estimate carry them as warnings.
 growing: a text file that is still being written.
 cdr: messages of ROS 2 as bytes.
+wheel_table: what wheels make of the speeds that they are asked for.
 joined_files: several files as one table.
 window_means: speeds that are means over a window.
 mat_file: a Run as a MATLAB file.

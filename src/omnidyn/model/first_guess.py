@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.model.drive import SPEED, Drive
+from omnidyn.model.drive import DUTY, SPEED, Drive
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import (
     EMF,
@@ -41,7 +41,7 @@ from omnidyn.model.surroundings import GRAVITY as GRAVITY
 from omnidyn.model.wheels import PerWheel, Wheels
 
 DIRECTION, BODY_AXES = "direction", "axes"
-GEAR, RATE = "motor.gear_ratio", "drive.rate_Hz"
+GEAR, LIMIT, RATE, SUPPLY = "motor.gear_ratio", "motor.voltage_limit_V", "drive.rate_Hz", "drive.supply_V"
 
 TOP_SPEED = 1.0  # [m/s] that the robot reaches at the voltage limit, friction included
 STALL_ACCELERATION = 8.0  # [m/s^2] stall force over mass: between a gentle robot (4) and a Robotino (15)
@@ -114,16 +114,19 @@ def first_guess(
     voltage_limit: float | None = None,
     shape: str = DIRECTION,
     speed_loop: Sequence[float] = (),
+    supply: float | None = None,
 ) -> Robot:
     """A robot from its wheels and its mass [kg]; voltage_limit [V] where it is known.
 
     shape: where friction acts, on the "direction" of travel (a disc) or on the body "axes" (the paper's box).
     speed_loop: of the firmware, (kp, ki, rate) [V s/rad, V/rad, Hz], or the rate alone: then the gains are guessed.
+    supply [V]: of a drive that takes duties; no voltage is above it.
 
     Its priors say of every number whether it was given or guessed, and how wide the guess is. Raises InputError.
     """
     body = Body(mass=mass, inertia=_round(0.5 * mass * _mean(wheels.robot_radius) ** 2), rotating_frame=True)
     friction = _friction(mass, _mean(wheels.robot_radius))
+    voltage_limit = supply if voltage_limit is None else voltage_limit
     motor = _motor(wheels, mass, friction, VOLTAGE_LIMIT if voltage_limit is None else voltage_limit)
     robot = Robot(
         name=name,
@@ -133,9 +136,9 @@ def first_guess(
         motor=motor,
         friction=Friction(direction=friction) if shape == DIRECTION else Friction(axes=_as_box(friction)),
         priors={},
-        drive=_speed_loop(motor, speed_loop),
+        drive=_speed_loop(motor, speed_loop) if supply is None else Drive(kind=DUTY, supply=supply),
     )
-    given_keys = {"body.mass_kg"} | ({"motor.voltage_limit_V"} if voltage_limit is not None else set())
+    given_keys = {"body.mass_kg", SUPPLY} | ({LIMIT} if voltage_limit is not None else set())
     given_keys |= {RATE} if len(speed_loop) == 1 else {RATE, *GAINS}
     priors = {}
     for key in map(Key.parse, all_keys(robot)):

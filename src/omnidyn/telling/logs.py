@@ -186,6 +186,13 @@ def _wheels_by_places(statement: Statement) -> str:
 
 
 SENTENCES = {
+    "wheel_table": Sentence(
+        "wheels turn {least:.2f} to {most:.2f} times as fast as asked, above a dead band of up to {dead_band:.2g} rad/s"
+    ),
+    "wheel_table_bent": Sentence(
+        "a straight line misses {share:%.0f} % of the largest speed of {subject}",
+        "hold more speeds, each until it is steady, or ask for less: a wheel at the limit of its supply stays behind",
+    ),
     **{code: Sentence(_doubt(reason), _settle) for code, reason in REASONS.items()},
     "assumption_unused": Sentence(
         "`assume` {assumption} is used for no column: there is none of this name or kind",

@@ -9,7 +9,8 @@ import omnidyn
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.planning.information import told_by
 from omnidyn.identification.planning.recorded import recorded
-from omnidyn.model.keys import BOX
+from omnidyn.model.keys import BOX, Key, with_priors
+from omnidyn.model.robot import IDENTIFIED, JOINT, Prior
 from tests.support.pages import command
 
 AXEBOT = omnidyn.load_robot("axebot")
@@ -57,6 +58,22 @@ def test_the_next_drive_is_for_the_widest_interval(fit):
 def test_a_robot_that_was_not_identified_has_no_next_drive():
     with pytest.raises(omnidyn.OmnidynError, match="no fit: no number of this robot was identified"):
         omnidyn.plan(AXEBOT, ROOM, 30.0, noise=NOISE, aim="next")
+
+
+def test_what_a_fit_left_open_is_not_taken_as_known():
+    """Of wheel angles under volts viscous friction and back-EMF are one sum: no drive tells them apart, nor may a plan
+    say so. What a fit writes beside the robot, a latency, is no number of a plan either."""
+    keys = ("motor.resistance_ohm", "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad")
+    told = {key: Prior(std=0.01 * float(Key.parse(key).get(AXEBOT)), origin=IDENTIFIED) for key in (*BOX[3:], *keys)}
+    left_open = {key: Prior(std=float(Key.parse(key).get(AXEBOT)), origin=JOINT) for key in BOX[:3]}
+    late = AXEBOT.replace(drive=AXEBOT.drive.replace(latency=0.01))
+    robot = with_priors(late, told | left_open | {"drive.latency_s": Prior(std=1e-4, origin=IDENTIFIED)})
+    made = omnidyn.plan(robot, ROOM, 30.0, noise={"wheel_speed": 0.1}, aim="next")
+    assert set(made.predicted) == {*BOX, *keys[:2]}
+    for key in keys[:2]:
+        assert made.predicted[key].half == pytest.approx(0.02, rel=0.05)
+    assert all(math.isinf(made.predicted[key].before) for key in BOX[:3])
+    assert made.verdict.numbers["widest"] in {*BOX[3:], *keys}
 
 
 def test_the_command_plans_the_next_drive(fit, tmp_path):
@@ -120,7 +137,7 @@ def test_limits_are_kept(name, limit):
         "heat": heat,
         "traction": np.abs(force).max() / load,
     }
-    assert 0.3 * limit < asked[name] <= 1.001 * limit
+    assert 0.25 * limit < asked[name] <= 1.001 * limit
     assert {"current": "draw too much current", "heat": "heat 0.5 W", "traction": "ask too much grip"}[name] in str(
         made
     )

@@ -9,8 +9,11 @@ import omnidyn
 from omnidyn.cli import main
 from omnidyn.identification.methods import OutputError
 from omnidyn.model.deadzone import axis_patterns
+from omnidyn.model.first_guess import first_guess, with_gear
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.log_effects import Sensors
+from omnidyn.model.robot import GIVEN
+from omnidyn.model.wheels import Wheels
 from tests.support.pages import command
 
 AXEBOT, MECANUM = omnidyn.load_robot("axebot"), omnidyn.load_robot("mecanum")
@@ -58,7 +61,7 @@ def test_the_fit_of_its_log_is_as_sure_as_it_was_told(made):
     """Of robots 30 % off: what identify says of each number beside its truth, and beside the prediction."""
     rng = np.random.default_rng(3)
     z, halves = [], []
-    for _ in range(10):
+    for _ in range(20):
         robot = off(made.robot, rng)
         run = driven(robot, made.commands())
         log = omnidyn.Run(
@@ -236,3 +239,15 @@ def test_an_ordinary_robot_is_as_sure_as_it_was_told():
     print(f"got over planned: {np.round(ratios, 2)}")
     assert 0.4 < np.exp(np.mean(np.log(ratios))) < 2.5
     assert max(ratios) < 5.0
+
+
+def test_the_first_plan_of_a_guess_moves_along_every_axis_and_turns_while_it_drives():
+    """A guess of friction is an order of magnitude: no robot that may be meant is without any, which would roll for
+    seconds. Turning while it drives tells the mass from the spin of rotors (M omega v), which nothing else does."""
+    wheels = Wheels(azimuth_deg=(45.0, 135.0, 225.0, 315.0), wheel_radius=0.04, robot_radius=0.17)
+    made = omnidyn.plan(with_gear(first_guess("guess", wheels, 4.2, supply=11.8), 30.0, "", GIVEN))
+    directions = {move.direction for _, move in made.moves}
+    assert {"forward", "sideways", "turn"} <= directions
+    assert made.unit == "duty"
+    assert {"motor.rotor_inertia_kg_m2", "body.inertia_kg_m2", "friction.direction.coulomb[1]"} <= set(made.learnt)
+    assert made.predicted["friction.direction.coulomb[0]"].half < 0.03

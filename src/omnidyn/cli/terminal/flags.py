@@ -52,6 +52,7 @@ PLAIN_OPTIONS = (
     "tol",
     "twist",
     "wheel_radius",
+    "wheel_table",
     "with",
     "workers",
 )

@@ -10,9 +10,10 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, NUISANCES
-from omnidyn.model.keys import expand
+from omnidyn.model.keys import DEAD_BAND, EMF, TORQUE, expand, name_of, with_priors
+from omnidyn.model.keys import LATENCY as LATENCY_KEY
 from omnidyn.model.known.told import numbers_told, uncertainty_of
-from omnidyn.model.robot import IDENTIFIED, Robot
+from omnidyn.model.robot import IDENTIFIED, JOINT, Robot
 
 D, A, NEXT = "D", "A", "next"  # the volume of all intervals; the sum of their squares; the widest, after a fit
 EXPLANATIONS = tuple(name for name in NUISANCES if name != LATENCY)
@@ -25,7 +26,8 @@ Score = Callable[[FloatArray], float]  # of the covariance of relative changes: 
 @dataclass(frozen=True)
 class PlanAim:
     """criterion: D, A or NEXT. names: of which it counts alone, as asked for; empty: of all numbers of the robot. keys:
-    of the robot file among them, expanded; nuisances: the others. Two names are explanations to be told apart."""
+    of the robot file among them, expanded, of NEXT those that the fit told; nuisances: the others. Two names are
+    explanations to be told apart."""
 
     criterion: str = D
     names: tuple[str, ...] = ()
@@ -41,7 +43,8 @@ class PlanAim:
 
         Raises InputError where one that was asked for is not free.
         """
-        found = [k for k, name in enumerate(names) if (self.counts(name) if self.names else k < count)]
+        of_all = not (self.names or set(self.keys) & set(names))
+        found = [k for k, name in enumerate(names) if (k < count if of_all else self.counts(name))]
         if self.names and (missing := [key for key in self.keys if key not in names[:count]]):
             raise InputError(
                 "not a number that is free", got=missing[0], expected=", ".join(names[:count]), where="aim"
@@ -68,7 +71,9 @@ def aim_of(text: str, robot: Robot) -> PlanAim:
 
     Raises InputError for anything else.
     """
-    if text in ("", D, A, NEXT):
+    if text == NEXT:
+        return PlanAim(NEXT, keys=fitted_keys(robot, (IDENTIFIED,)))
+    if text in ("", D, A):
         return PlanAim(text or D)
     names = tuple(name.strip() for name in text.split(","))
     nuisances = tuple(name for name in names if name.partition(".")[0] in EXPLANATIONS)
@@ -84,13 +89,15 @@ def aim_of(text: str, robot: Robot) -> PlanAim:
     return PlanAim(D, names, keys, nuisances)
 
 
-def fitted_keys(robot: Robot) -> tuple[str, ...]:
-    """The numbers that the fit which wrote a robot file told.
+def fitted_keys(robot: Robot, origins: Sequence[str] = (IDENTIFIED, JOINT)) -> tuple[str, ...]:
+    """The numbers of a robot that the fit which wrote its file told, and those that it left open beside them.
 
+    Not what it fits beside the robot, latency and dead band, nor the EMF constant, which goes with the torque constant.
     Raises InputError where there are none.
     """
-    priors = numbers_told(robot)
-    keys = tuple(key for key, prior in priors.items() if prior.origin == IDENTIFIED and prior.std)
+    found = {key: name_of(key) for key, prior in numbers_told(robot).items() if prior.origin in origins and prior.std}
+    beside = {LATENCY_KEY, DEAD_BAND} | ({EMF} if TORQUE in found.values() else set())
+    keys = tuple(key for key, name in found.items() if name not in beside)
     if not keys:
         raise InputError(
             "no fit: no number of this robot was identified",
@@ -115,3 +122,9 @@ def known_of(robot: Robot, names: Sequence[str]) -> FloatArray:
     inverse = (vectors / np.maximum(values, SURE)) @ vectors.T
     information[np.ix_(places, places)] = inverse / np.outer(share, share)
     return information
+
+
+def without_priors(robot: Robot) -> Robot:
+    """The robot without the std of what a fit left open: what the fit knew of the others holds that already."""
+    left_open = {key: prior for key, prior in numbers_told(robot).items() if prior.origin == JOINT}
+    return with_priors(robot, {key: prior.replace(std=None) for key, prior in left_open.items()})

@@ -15,20 +15,21 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.problem.nuisances import PUSH, TILT
-from omnidyn.identification.planning.aims import NEXT, PlanAim, aim_of, fitted_keys, known_of
+from omnidyn.identification.planning.aims import NEXT, PlanAim, aim_of, fitted_keys, known_of, without_priors
 from omnidyn.identification.planning.information import Prediction, information_of, told_by
-from omnidyn.identification.planning.limits import GRIP, PlanLimits, limits_of, refuse_set_points
+from omnidyn.identification.planning.limits import GRIP, PlanLimits, limits_of
 from omnidyn.identification.planning.moves import FORWARD, RAMP, SIDEWAYS, STEP, TURN, PlannedMove, all_moves
-from omnidyn.identification.planning.planned import Plan, Predicted
-from omnidyn.identification.planning.recorded import Noise, driven, noise_of, recorded
+from omnidyn.identification.planning.planned import UNITS, Plan, Predicted
+from omnidyn.identification.planning.recorded import Noise, driven, largest_input, noise_of, recorded
 from omnidyn.identification.planning.search import ROOM, UNKNOWN, TriedMove, chosen, fitting, tried
-from omnidyn.model.drive import DUTY
-from omnidyn.model.keys import expand, find_key, friction_keys
+from omnidyn.model.keys import COULOMB, Key, expand, find_key, friction_keys, with_priors
+from omnidyn.model.known.told import numbers_told
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run
 from omnidyn.simulation.batch.sample import sample
 
+FACTOR = 0.49  # std of a guessed Coulomb friction, as a share of it: less than half, which makes it a factor
 DRAWS, GUESS = 10, (0.7, 1.3)  # robots that may be meant; share of a number of which nothing is known
 ROOM_SHARE = 0.8  # of the way to the border: what a plan uses of it
 HELD_OUT_SHARE = 0.15  # of the time: a second program, to judge the fit by
@@ -82,7 +83,7 @@ def plan(
             traction=, force of a wheel over what it carries; default: 0.8 of the grip of wheels that may slip.
 
     Raises InputError for a room, a time, a limit or a noise that cannot be, for an aim that is not free, and for "next"
-    of a robot that was not identified; UnsupportedError for a robot whose firmware holds the speeds of its wheels;
+    of a robot that was not identified;
     InsufficientDataError where no move is left, or no log of these channels tells two explanations apart.
 
     >>> import omnidyn
@@ -94,11 +95,13 @@ def plan(
     width, depth = _room(area)
     _check("seconds", seconds, SHORTEST, LONGEST, "s")
     _check("rate", rate, SLOWEST, FASTEST, "Hz")
-    refuse_set_points(robot)
     goal = aim_of(aim, robot)
     question = _question(robot, free, goal)
-    planner = _planner(robot, 1.0 / rate, noise, question, limits)
-    return replace(planner, aim=goal).planned((width, depth), seconds, progress)
+    planner = replace(_planner(robot, 1.0 / rate, noise, question, limits), aim=goal)
+    if goal.criterion == NEXT:
+        bare = [without_priors(one) for one in (planner.robot, planner.rolling, *planner.robots)]
+        planner = replace(planner, robot=bare[0], rolling=bare[1], robots=bare[2:])
+    return planner.planned((width, depth), seconds, progress)
 
 
 def _planner(
@@ -202,7 +205,8 @@ class _Planner:
         """The prediction beside what the fit before told."""
         if self.aim.criterion != NEXT:
             return prediction
-        return prediction.beside(self._known(prediction.names[: prediction.robot_count]))
+        names = prediction.names[: prediction.robot_count]
+        return prediction.beside(self._known(names))
 
     def _score(self, prediction: Prediction) -> float:
         """That of a whole plan: less is better."""
@@ -262,7 +266,8 @@ class _Planner:
         apart = self._apart(values)
         names = values.names[: values.robot_count]
         halves = {name: 2.0 * np.array([one.of(name) for one in predictions]) for name in names}
-        before = np.diag(np.linalg.pinv(self._known(names), hermitian=True))
+        earlier = self._known(names)
+        before = np.where(np.diag(earlier) > 0.0, np.diag(np.linalg.pinv(earlier, hermitian=True)), 0.0)
         predicted = {
             name: Predicted(
                 float(value),
@@ -272,15 +277,13 @@ class _Planner:
             )
             for name, value, variance in zip(names, values.value, before, strict=False)
         }
-        is_duty = self.robot.drive.kind == DUTY
-        limit = np.ones(1) if is_duty else np.broadcast_to(self.robot.motor.voltage_limit, self.robot.wheels.count)
         return Plan(
             self.robot,
             self.dt,
             made.share,
             made.held_out,
-            DUTY if is_duty else "V",
-            limit,
+            UNITS.get(self.robot.drive.kind, "V"),
+            largest_input(self.robot),
             made.moves,
             area,
             reach,
@@ -349,7 +352,17 @@ def _opening(moves: Sequence[TriedMove]) -> list[PlannedMove]:
 
 
 def _robots(robot: Robot) -> list[Robot]:
-    """Robots that may be meant: by the std of the file, else with friction and torque up to 30 % off."""
+    """Robots that may be meant: by the std of the file, else with friction and torque up to 30 % off.
+
+    A Coulomb friction that is a guess is drawn as a factor: none of them is without it, which would roll on for seconds
+    after each move. Nor are the gains of a speed loop drawn: its firmware was tuned so that it holds speeds.
+    """
+    guesses = {key: prior for key, prior in numbers_told(robot).items() if prior.guessed and prior.std}
+    dry = {key: prior for key, prior in guesses.items() if Key.parse(key).level == COULOMB}
+    most = {key: FACTOR * abs(float(Key.parse(key).get(robot))) for key in dry}
+    narrower = {key: prior.replace(std=min(prior.std or 0.0, most[key])) for key, prior in dry.items() if most[key]}
+    loop = {key: prior.replace(std=None) for key, prior in numbers_told(robot).items() if key.startswith("drive.")}
+    robot = with_priors(robot, narrower | loop)
     try:
         return list(sample(robot, DRAWS, SEED))
     except InsufficientDataError:

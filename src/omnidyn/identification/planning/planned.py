@@ -16,7 +16,7 @@ from omnidyn.identification.planning.aims import NEXT, PlanAim
 from omnidyn.identification.planning.limits import PlanLimits, strain
 from omnidyn.identification.planning.moves import PlannedMove
 from omnidyn.identification.planning.recorded import driven
-from omnidyn.model.drive import DUTY
+from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.keys import in_words
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
@@ -26,6 +26,8 @@ from omnidyn.statement import NOTE, WARNING, Statement, as_verdict
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+UNITS = {DUTY: DUTY, SPEED: "rad/s"}  # kind of drive -> unit of its input; else V
+CHANNELS = {"V": "voltage", DUTY: "duty", "rad/s": "wheel_speed_command"}  # of a Run
 FINEST_SHARE = 0.005  # half an interval, of the number: below, what the model leaves out decides, not the sensors
 OPEN_SHARE = 0.5  # half an interval, of the number: what is wider is not learnt
 
@@ -51,7 +53,7 @@ class Plan(Displayable):
     """A program of moves, and what it will tell.
 
     robot: it is made for. dt [s]: of a row. share (rows, wheels), held_out (rows, wheels): the input of the program and
-    of a second one to judge the fit by, as shares of the largest input; `limit` is that input, in `unit`, V or duty.
+    of a second one to judge the fit by, as shares of the largest input; `limit` is that, in `unit`: V, duty or rad/s.
     moves: (start [s], move) of the program. area [m], reach [m]: the room, and how far it goes along x and y at most,
     of all robots drawn. predicted: key -> what will be known. noise: channel -> std of what is recorded, of
     wheel_angle the step of a count [rad]. robots: how many were drawn. blind: what no log of these channels shows, and
@@ -87,9 +89,8 @@ class Plan(Displayable):
         """The program, or the one to judge by: time and input of each row, as `read_commands` takes them."""
         share = self.held_out if held_out else self.share
         t, values = np.asarray(self.dt * np.arange(len(share)), dtype=float), share * self.limit
-        if self.unit == DUTY:
-            return Run(t=t, duty=values, source="planned")
-        return Run(t=t, voltage=values, source="planned")
+        channel: dict[str, Any] = {CHANNELS[self.unit]: values}
+        return Run(t=t, source="planned", **channel)
 
     def drive(self) -> Run:
         """What the robot of the file does under the program."""
@@ -114,8 +115,9 @@ class Plan(Displayable):
             "seconds": self.seconds,
         }
         if self.aim.criterion == NEXT:
-            widest = max(self.predicted, key=lambda name: self.predicted[name].half)
-            before = max(self.predicted, key=lambda name: self.predicted[name].before)
+            counted = [name for name in self.predicted if name in self.aim.keys] or list(self.predicted)
+            widest = max(counted, key=lambda name: self.predicted[name].half)
+            before = max(counted, key=lambda name: self.predicted[name].before)
             numbers |= {"widest": widest, "share": self.predicted[widest].half}
             numbers |= {"before": before, "known": self.predicted[before].before}
             return Statement("planned_next", NOTE, self.robot.name, numbers)

@@ -8,7 +8,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
-from omnidyn.model.drive import DUTY
+from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -21,7 +21,8 @@ CHANNELS = {
     "twist": 3,
     "pose": 3,
 }  # entries of each; 0: one per wheel
-INPUTS = ("voltage", "duty", "supply")
+INPUTS = ("voltage", "duty", "supply", "wheel_speed_command")
+SPEED_SHARE = 0.8  # of the speed without load: the most that a firmware is asked for, so that it can hold it
 FINE = 4  # steps in a row, over which the angle of a wheel adds up
 TOLERANCE = 3e-4  # [m/s] of a run: well below what stands, and what sensors see
 COUNTS = 2048.0  # in a turn of a wheel, where the robot file says nothing
@@ -63,9 +64,22 @@ def noise_of(robot: Robot, dt: float, given: Mapping[str, object] | None = None)
 
 def driven(robot: Robot, share: FloatArray, dt: float, tol: float = TOLERANCE) -> Run:
     """A run from rest under an input given as a share of the largest one, rows of dt [s], shape (rows, wheels)."""
+    rows = share * largest_input(robot)
     if robot.drive.kind == DUTY:
-        return simulate(robot, duty=share, supply=robot.drive.supply, dt=dt, tol=tol)
-    return simulate(robot, share * np.asarray(robot.motor.voltage_limit), dt, tol=tol)
+        return simulate(robot, duty=rows, supply=robot.drive.supply, dt=dt, tol=tol)
+    if robot.drive.kind == SPEED:
+        return simulate(robot, wheel_speed_command=rows, dt=dt, tol=tol)
+    return simulate(robot, rows, dt, tol=tol)
+
+
+def largest_input(robot: Robot) -> FloatArray:
+    """The most that is asked for: a duty of 1, volts, or rad/s of a speed loop, of each wheel or of all."""
+    if robot.drive.kind == DUTY:
+        return np.ones(1)
+    limit = np.broadcast_to(np.asarray(robot.motor.voltage_limit, dtype=float), robot.wheels.count)
+    if robot.drive.kind == SPEED:
+        return SPEED_SHARE * limit / (np.asarray(robot.motor.emf_constant) * np.asarray(robot.motor.gear_ratio))
+    return limit
 
 
 def recorded(robot: Robot, share: FloatArray, dt: float, noise: Noise, rng: np.random.Generator) -> Run:
