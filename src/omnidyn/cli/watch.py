@@ -21,6 +21,7 @@ from omnidyn.document import sentence
 from omnidyn.errors import InputError
 
 if TYPE_CHECKING:
+    from omnidyn.identification.live.live import Live
     from omnidyn.identification.live.status import LiveStatus
     from omnidyn.logs.growing import GrowingTable
     from omnidyn.run import Run
@@ -49,7 +50,7 @@ def watch(
 ) -> None:
     """Say each second what a log tells while it grows: numbers, intervals, and whether that is enough.
 
-    Ctrl-C, the end of the input or --idle end it; then all numbers are shown. Gaps, restarts and lines that are no rows
+    Ctrl-C, the end of the input or --idle end it; then all rows are fitted once more and all numbers shown. Gaps, restarts and lines that are no rows
     are survived, and said. Exit code 4 where it ends before it is enough.
     """
     from omnidyn.identification.live.live import Live
@@ -96,11 +97,21 @@ def watch(
         raise
     if table.bad_rows > told_bad:
         _tell_bad(table)
-    status = live.status
-    if not json:
+    status = live.status if until_enough and live.status.is_enough else _finished(live)
+    if json:
+        _tell(status, json)
+    else:
         tell(status.document(), False, provenance([robot_input(robot)]))
     if not status.is_enough:
         end_failed(status.verdict)
+
+
+def _finished(live: Live) -> LiveStatus:
+    """The last answer, after a whole fit; Ctrl-C once more goes without it."""
+    try:
+        return live.finish()
+    except KeyboardInterrupt:
+        return live.status
 
 
 def _tell_bad(table: GrowingTable) -> int:

@@ -38,12 +38,28 @@ def live(log):
     return fed(log)
 
 
-def test_numbers_are_those_of_the_fit_of_the_whole_log(live, log):
-    fit = Fit.of([log], WRONG, live.method)
+def whole_fit(log, method):
+    fit = Fit.of([log], WRONG, method)
     solution = fit.weighed(fit.solve()).solution
-    whole = dict(zip(solution.solver.problem.names, solution.state.point.values.tolist(), strict=True))
+    return dict(zip(solution.solver.problem.names, solution.state.point.values.tolist(), strict=True))
+
+
+def test_numbers_are_those_of_the_fit_of_the_whole_log(live, log):
+    whole = whole_fit(log, live.method)
     for name, number in live.status.numbers.items():
         assert abs(number.value - whole[name]) < 0.3 * number.std, name
+
+
+def test_a_drive_ends_with_the_whole_fit_where_errors_remember(exact):
+    """Such a likelihood has several optima, some tenths of a standard error apart: sums may stay at another one."""
+    log = coloured(exact, 2)
+    live = fed(log)
+    rows, seconds, values = live.status.rows, live.status.seconds, live.finish().numbers
+    whole = whole_fit(log, live.method)
+    assert {name: number.value for name, number in values.items()} == pytest.approx(whole, rel=1e-9)
+    assert (live.status.rows, live.status.seconds) == (rows, seconds)
+    assert live.finish().numbers == values
+    assert omnidyn.Live(WRONG).finish().verdict.code == "live_waiting"
 
 
 def test_intervals_hold_the_truth_with_a_start_twice_wrong(live):
