@@ -63,7 +63,7 @@ def watch(
     before = omnidyn.load_robot(reference) if reference else None
     method = OutputError(free=tuple(free), nuisances=("latency", "push")) if free else None
     live = Live(given, method, within=within / 100.0, reference=before)
-    table, told_bad = GrowingTable(source, given, flags.options()), 0
+    table, told_bad, told_resets = GrowingTable(source, given, flags.options()), 0, 0
 
     def is_over(runs: list[Run]) -> bool:
         """Take runs, and tell each second of them; whether that is enough, and all that was asked for."""
@@ -83,6 +83,9 @@ def watch(
             is_first, runs = table.columns is None, table.feed(text)
             if is_first and table.columns is not None:
                 maps.show(source, table.columns)
+            if table.resets > told_resets:
+                told_resets = table.resets
+                say(f"omnidyn: warning: an encoder was set to another value, {told_resets} times so far: it goes on")
             if table.bad_rows > 2 * told_bad:
                 told_bad = _tell_bad(table)
             if is_over(runs):
