@@ -50,8 +50,8 @@ def watch(
 ) -> None:
     """Say each second what a log tells while it grows: numbers, intervals, and whether that is enough.
 
-    Ctrl-C, the end of the input or --idle end it; then all rows are fitted once more and all numbers shown. Gaps, restarts and lines that are no rows
-    are survived, and said. Exit code 4 where it ends before it is enough.
+    Ctrl-C, the end of the input or --idle end it; then all rows are fitted once more and all numbers shown. Gaps,
+    restarts and lines that are no rows are survived, and said. Exit code 4 where it ends before it is enough.
     """
     from omnidyn.identification.live.live import Live
     from omnidyn.identification.methods import OutputError

@@ -157,6 +157,29 @@ def test_a_model_that_leaves_something_out_is_said_and_never_enough():
     assert abs(statuses[-1].numbers[BOX[5]].value / TRUTH[BOX[5]] - 1.0) > 0.5
 
 
+def test_a_stretch_with_a_lifted_wheel_is_never_enough():
+    """For 3 s one wheel turns in the air: an Euler simulation of the paper's equations, whose numbers come out wrong."""
+    volts = voltages(np.random.default_rng(21), 50.0)
+    mass, viscous, level = np.array([1.5, 1.5, 0.025]), np.array(list(TRUTH.values())[:3]), np.array([2.2, 1.5, 0.099])
+    azimuth = np.deg2rad([180.0, -60.0, 60.0])
+    wrench = np.stack([-np.sin(azimuth), np.cos(azimuth), np.full(3, 0.1)])
+    k, step, v, twist = 19.0 * 0.0059 / 0.035, 1e-3, np.zeros(3), [np.zeros(3)]
+    for row, u in enumerate(volts):
+        ground = wrench * np.where((np.arange(3) == 1) & (2000 <= row < 2300), 0.0, 1.0)
+        for _ in range(10):
+            free = v + step * (ground @ (k * (u - k * ground.T @ v) / 1.69) - viscous * v) / mass
+            v = np.sign(free) * np.maximum(np.abs(free) - step * level / mass, 0.0)
+        twist.append(v)
+    noise = NOISE * np.random.default_rng(1).normal(size=(len(twist), 3))
+    log = omnidyn.Run(t=np.arange(len(twist)) / 100.0, voltage=np.vstack([volts, volts[-1]]), twist=twist + noise)
+    live = omnidyn.Live(WRONG, within=0.2)
+    statuses = [status for first in range(0, len(log), 100) for status in live.answers(part(log, first, first + 100))]
+    assert any(status.is_enough for status in statuses[:20])  # before it
+    assert not any(status.is_enough for status in statuses[25:])
+    odd = LiveStatus("robot", 44.0, 1, {"x": LiveNumber(1.0, 0.0, 1.0, 1.0, 0.1, False)}, unexplained=live._missed[-1])
+    assert "do not explain twist" in str(odd.verdict)
+
+
 def test_an_unknown_width_is_said_in_words_and_percents_have_no_exponent():
     number = LiveNumber(0.0, 1.0, 0.0, 2.0, 0.1, False)
     status = LiveStatus("robot", 9.0, 900, {"friction.axes.viscous[0]": number})

@@ -39,6 +39,7 @@ ROUNDS, START_ROUNDS = 3, 3  # of numbers and noise in turn; until it is known w
 LINEAR_STEPS = 2  # of the fit's solver, when all rows that are kept are taken anew
 RECENT = 3  # stretches that are compared with a fit before
 SIGNAL = 3.0  # times its noise, that an output must vary by in a stretch that judges
+UNEXPLAINED = 2.0  # times the noise: the mean square that the numbers of all rows leave of a stretch that they miss
 CHANCE = 5.0  # standard errors of a mean square that noise alone does not reach
 
 
@@ -122,6 +123,20 @@ class LiveModel:
             {name: float(limit[k]) for name, k in kept},
             self._has_signal,
         )
+
+    def unexplained(self, rows: Rows, start: float, end: float) -> PredictedStretch | None:
+        """A stretch that is closed, if the numbers as they are now leave more of it than noise: what happened in it is
+        not in the model, and yet counts in the numbers. None where all is well, or its rows are gone."""
+        kept, self._starts = (self._starts, self._has_signal), ()
+        told = self.told_by(rows, start, end)
+        self._starts, self._has_signal = kept
+        ratio = {
+            f"{name}[{index}]": float(told.square[c] / told.number[c] / max(self.variance[c], 1e-300))
+            for c, (name, index) in enumerate(told.columns)
+            if told.number[c] > 0.0
+        }
+        stretch = PredictedStretch(start, end, ratio, dict.fromkeys(ratio, UNEXPLAINED), True)
+        return stretch if stretch.missed else None
 
     def close(self, end: float) -> None:
         """The open stretch is done: it counts like all before, and the next one begins."""
