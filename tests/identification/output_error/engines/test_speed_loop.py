@@ -39,9 +39,9 @@ def ellipse(looped):
     )
 
 
-def twists(seed, rows=500):
+def twists(seed, rows=500, rest=20):
     """Set twists at 100 Hz: rest, then levels held 0.3 to 1.2 s."""
-    rng, found, row = np.random.default_rng(seed), np.zeros((rows, 3)), 20
+    rng, found, row = np.random.default_rng(seed), np.zeros((rows, 3)), rest
     while row < rows:
         end = min(rows, row + int(rng.uniform(30, 120)))
         found[row:end] = rng.uniform(-1.0, 1.0, 3) * [0.6, 0.6, 4.0] * (rng.random(3) < 0.8)
@@ -49,9 +49,9 @@ def twists(seed, rows=500):
     return found
 
 
-def log(robot, seed, rows=500, late=0, channels=("twist", "current")):
+def log(robot, seed, rows=500, late=0, channels=("twist", "current"), rest=20):
     """A run at 100 Hz with noise, seen `late` ms late."""
-    command = twists(seed, rows)
+    command = twists(seed, rows, rest)
     fine = simulate(robot, dt=1e-3, twist_command=np.repeat(command, 10, axis=0), tol=1e-7)
     rng, seen = np.random.default_rng(1000 + seed), np.maximum(np.arange(rows) * 10 - late, 0)
     found = {}
@@ -80,6 +80,17 @@ def test_gains_and_friction_that_are_not_known(looped):
     assert_near(fit, looped)
     assert fit.std[KP] < 0.02 * 0.25
     np.testing.assert_allclose(list(fit.noise.values()), [*NOISE, *[CURRENT_NOISE] * 3], rtol=0.15)
+
+
+@pytest.mark.parametrize("rest", [20, 300])
+def test_gains_three_times_too_small(looped, rest):
+    """Of the first 0.6 s, as of a rest, friction 0 and a wrong latency are as good: no descent came back from there."""
+    run = log(looped, 0, 1000, late=12, rest=rest)
+    fit = identify(run, wrong(looped, **{KP: 1 / 3, KI: 1 / 3}), OutputError(nuisances=("latency",)), quick=True)
+    assert_near(fit.estimate, looped)
+    for name in ("latency.twist", "latency.current"):
+        late = fit.estimate.nuisances[name]
+        assert abs(late.value - 0.012) < 4.5 * late.std, name
 
 
 def test_an_ellipse_robot_seen_late(ellipse):

@@ -73,7 +73,8 @@ class LoopEngine(ImplicitEngine):
         state: FloatArray,
         values: FloatArray,
     ) -> Parts:
-        residual, slopes, indices = super()._piece(robot, moved, scales, piece, state, values)
+        with np.errstate(over="ignore"):
+            residual, slopes, indices = super()._piece(robot, moved, scales, piece, state, values)
         return residual, np.clip(np.nan_to_num(slopes), -SLOPE_LIMIT, SLOPE_LIMIT), indices
 
     def _run(

@@ -18,6 +18,7 @@ Column = tuple[str, int]
 Parts = tuple[FloatArray, FloatArray, IntArray]  # residuals (C, rows), slopes (C, rows, U), which U among P and states
 
 LEAST_ROWS = 300  # of a piece that is cut
+DRIVEN = 0.05  # of the greatest input of a piece: what is less is a rest, of measured volts too
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,13 @@ class Piece:
     def step(self) -> float:
         """Usual time between two samples [s]."""
         return self.record.step_of(slice(self.first, self.last + 1))
+
+    @property
+    def rest_rows(self) -> int:
+        """Rows at its beginning in which nothing drives it."""
+        inputs = self.record.voltage if self.record.set_point is None else self.record.set_point
+        most = np.abs(inputs[self.first : self.last + 1]).max(axis=1)
+        return int(np.argmax(most > DRIVEN * most.max()))
 
     def start_prior(self, state: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(pull (3,) of what is known of the start, its information (3,)), 0 for what is not free; state (3 + C,)."""
@@ -125,20 +133,22 @@ class Problem(FitProblem):
         """The robot with these values of the parameters, not checked."""
         return robot_at(self.robot, self.robot_parameters, values)
 
-    def shortened(self, rows: int) -> Problem:
+    def shortened(self, rows: int, beyond_rest: bool = False) -> Problem:
         """The same problem on about `rows` rows: the beginnings of some pieces, evenly among all; no row of the others.
 
-        None is so short that it tells nothing: of many pieces few are taken.
+        None is so short that it tells nothing: of many pieces few are taken. beyond_rest: a rest at the beginning of a
+        piece, which tells no number, is not counted.
         """
-        lengths = np.array([piece.last - piece.first + 1 for piece in self.pieces])
+        rests = np.array([piece.rest_rows if beyond_rest else 0 for piece in self.pieces])
+        lengths = np.array([piece.last - piece.first + 1 for piece in self.pieces]) - rests
         if lengths.sum() <= rows:
             return self
         count = int(np.clip(rows // LEAST_ROWS, 1, len(lengths)))
         chosen_pieces = np.unique(np.linspace(0, len(lengths) - 1, count).round().astype(int))
         share = min(rows / lengths[chosen_pieces].sum(), 1.0)
         pieces = [
-            replace(piece, last=piece.first + max(int((length - 1) * (share if k in chosen_pieces else 0.0)), 1))
-            for k, (piece, length) in enumerate(zip(self.pieces, lengths.tolist(), strict=True))
+            replace(piece, last=piece.first + max(rest + int((length - 1) * share) if k in chosen_pieces else 0, 1))
+            for k, (piece, rest, length) in enumerate(zip(self.pieces, rests.tolist(), lengths.tolist(), strict=True))
         ]
         return replace(self, pieces=tuple(pieces))
 

@@ -44,7 +44,7 @@ def first_point(solver: Solver, records: Sequence[Record]) -> State:
     integral_point = integral_start(mapping, start_point.values[:count], records)
     values = start_point.values.copy()
     values[:count] = friction_values(mapping, start_point.values[:count], integral_point)
-    short = problem.shortened(MANY_ROWS)
+    short = problem.shortened(MANY_ROWS, beyond_rest=True)
     trial = solver if short is problem else Solver(short, kind_with(exact=True).of(short))
     states = [trial.state(start_point), trial.state(Point(values, start_point.states))]
     best = _by_latencies(trial, min(states, key=lambda state: state.objective))
@@ -107,7 +107,7 @@ def coarse_point(problem: Problem, nu: float, progress: FitProgress) -> State:
     """A state near the best point, by a step a row; a long log is first fitted in part."""
     progress.enter("looking for a start")
     solver = _by_row(problem, nu)
-    short, start_point = problem.shortened(FEW_ROWS), moving_start(problem, nu, progress)
+    short, start_point = problem.shortened(FEW_ROWS, beyond_rest=True), moving_start(problem, nu, progress)
     if short is problem:
         return solver.minimise(start_point, progress=progress).state
     short_point = (
@@ -218,7 +218,7 @@ def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
 
     With the latencies that go with it. Where outputs add up, the better one of that and what their rates say.
     """
-    start_point, short = problem.start(), problem.shortened(FEW_ROWS)
+    start_point, short = problem.start(), problem.shortened(FEW_ROWS, beyond_rest=True)
     solver = _by_row(short, nu)
     friction = np.array([p.part == FRICTION for p in problem.parameters], bool)
     points = [

@@ -30,7 +30,7 @@ from omnidyn.sensors import TRAVEL
 from omnidyn.statement import WARNING, Statement
 
 FINE_TOLERANCE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
-SETTING_OFF = 60  # rows of each log on which starts are tried
+SETTING_OFF, LEAST_ROWS = 3.0, 300  # [s], rows from the first set speed on, of each log, on which starts are tried
 STILL_ROWS = 3  # rows at the beginning in which nothing may move
 MOTION_ERRORS = 6.0  # standard errors, of the scatter of these rows, that count as motion
 LATENCY, CURRENTS = "latency", "latency.current"
@@ -38,7 +38,7 @@ DRIVE, MOTOR = "drive", "motor"
 LATENCY_PERIODS = 3  # periods of the loop, each way, in which a latency of the currents is tried
 GAIN_FACTORS, LEVEL_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.3, 1.0, 3.0)
 TRIAL_LATENCIES = (0.0, 0.02, 0.05, 0.1, 0.15)  # [s]
-BEST = 2  # of the starts from which the fit is carried on
+BEST = 2  # of the latencies, and of the starts with each of them, from which the fit is carried on
 GAIN_MOVES = (1.0, -1.0, 3.0, -3.0, 6.0, -6.0)  # standard errors by which a gain is moved
 BRANCH_GAIN, ROUNDS = 1.0, 10  # of -log likelihood that counts as another branch; how often
 FEW_ITERATIONS = 8  # iterations of each before the better one is taken
@@ -181,7 +181,7 @@ def _motors_first(solver: Solver, coarse_solution: Solution, progress: FitProgre
 
 def loop_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
     """Where a fit begins: the best of several starts, tried on what sets off."""
-    short = shortened(problem, SETTING_OFF)
+    short = setting_off(problem)
     start_state = best_start(Solver(short, kind_with(has_loop=True).of(short), nu), progress)
     return Point(start_state.values, problem.start().states)
 
@@ -196,7 +196,7 @@ def retimed(solver: Solver, point: Point, progress: FitProgress) -> Point:
     period = 1.0 / (problem.robot.drive.rate or np.inf)
     latency_indices = [j for j, p in enumerate(problem.parameters) if p.part == LATENCY]
     current_indices = [j for j in latency_indices if problem.names[j].partition("@")[0] == CURRENTS]
-    short = shortened(problem, SETTING_OFF)
+    short = setting_off(problem)
     row = min(p.step for p in short.pieces)
     if not current_indices or not period:
         return point
@@ -224,16 +224,32 @@ def shortened(problem: Problem, rows: int) -> Problem:
     return replace(problem, pieces=tuple(replace(p, last=min(p.last, p.first + rows)) for p in problem.pieces))
 
 
+def setting_off(problem: Problem) -> Problem:
+    """The same problem with the rows of every piece until it has moved for a while: starts are tried on these.
+
+    A rest at the beginning tells nothing, and half a second of motion too little: friction and gains trade there.
+    """
+    return replace(problem, pieces=tuple(replace(piece, last=_last_of_start(piece)) for piece in problem.pieces))
+
+
+def _last_of_start(piece: Piece) -> int:
+    first = piece.first + piece.rest_rows
+    late = int(np.searchsorted(piece.record.t, piece.record.t[first] + SETTING_OFF))
+    return min(piece.last, max(late, first + LEAST_ROWS))
+
+
 def best_start(solver: Solver, progress: FitProgress) -> Point:
     """The best of several starts: all gains, all friction and all latencies by factors, then a few steps of each."""
     problem, below_progress = solver.problem, progress.below()
     delays = _if_any(problem, LATENCY, TRIAL_LATENCIES, 0.0)
     by_delay = _tried(solver, [(trial_delay, 1.0, 1.0) for trial_delay in delays], "latencies", below_progress)
-    delay = delays[int(np.argmin([state.objective for state in by_delay]))]
     levels, gains = _if_any(problem, FRICTION, LEVEL_FACTORS), _if_any(problem, DRIVE, GAIN_FACTORS)
-    factors = [(delay, *pair) for pair in itertools.product(levels, gains)]
-    states = sorted(_tried(solver, factors, "friction and gains", below_progress), key=lambda state: state.objective)
-    solutions = [solver.minimise(state.point, FEW_ITERATIONS, below_progress) for state in states[:BEST]]
+    solutions = []
+    for k in np.argsort([state.objective for state in by_delay])[:BEST].tolist():
+        factors = [(delays[k], *pair) for pair in itertools.product(levels, gains)]
+        states = _tried(solver, factors, "friction and gains", below_progress)
+        best_states = sorted(states, key=lambda state: state.objective)[:BEST]
+        solutions += [solver.minimise(state.point, FEW_ITERATIONS, below_progress) for state in best_states]
     return min(solutions, key=lambda solution: solution.state.objective).state.point
 
 
