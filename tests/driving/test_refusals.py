@@ -61,6 +61,19 @@ def test_a_duty_beyond_the_supply_is_refused():
         DriveProgram(robot, 0.02, ROWS)
 
 
+def test_volts_beyond_the_limit_of_a_motor_are_refused():
+    rows = ROWS.copy()
+    rows[3] = (0.0, 5.0, -6.5)
+    with pytest.raises(
+        InputError, match=r"volts beyond the limit of the motor; got 6\.5 V at wheel 3; expected .* 6 V"
+    ):
+        DriveProgram(ROBOT, 0.02, rows)
+    one_weaker = ROBOT.replace(motor=ROBOT.motor.replace(voltage_limit=(6.0, 2.0, 6.0)))
+    with pytest.raises(InputError, match=r"got 3 V at wheel 2; expected at most 2 V.*; take smaller volts"):
+        DriveProgram(one_weaker, 0.02, ROWS)
+    assert DriveProgram(ROBOT, 0.02, 2.0 * ROWS).legs  # 6 V itself
+
+
 def test_rows_that_are_longer_than_a_command_acts_are_refused():
     program = DriveProgram(ROBOT, 0.2, ROWS)
     with pytest.raises(InputError, match="rows are longer than a command acts"):

@@ -121,3 +121,19 @@ def test_a_json_that_is_no_plan_is_refused(plan, tmp_path):
         (tmp_path / "plan.json").write_text(json.dumps(broken))
         with pytest.raises(InputError, match=r"no plan in this file|plan\.json"):
             read_program(tmp_path / "plan.csv")
+
+
+def test_a_drive_whose_loop_was_held_up_again_and_again_is_known_again(plan):
+    program, draws = read_program(plan), np.random.default_rng(3)
+    rows = len(program.inputs) // 2
+    held_up = np.where(draws.random(rows) < 0.02, draws.uniform(0.0, 0.2, rows), 0.0)  # a busy machine: 0.2 s at most
+    t = program.dt * np.arange(rows) + np.cumsum(held_up)
+    log = omnidyn.Run(t=t, voltage=program.inputs[:rows])
+    assert t[-1] > 1.05 * program.dt * rows
+    leg = next(leg for leg in program.legs if leg.end > rows)
+    rest = rest_of(program, [log])
+    np.testing.assert_array_equal(rest.inputs[-len(program.inputs) + leg.first :], program.inputs[leg.first :])
+    assert rest.legs[0].words == leg.words
+    other = omnidyn.Run(t=t, voltage=draws.permutation(program.inputs[:rows]))
+    with pytest.raises(InputError, match="not a log of this program"):
+        rest_of(program, [other])

@@ -95,7 +95,7 @@ class Here:
     async def ask(self, job, request):
         return JOBS[job](request, lambda kind, value: None, queue.Queue())
 
-    def send(self, message):
+    def command(self, value):
         pass
 
 

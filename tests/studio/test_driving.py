@@ -1,8 +1,12 @@
 """A drive without a page, and a worker without a server."""
 
 import asyncio
+import json
 import queue
 import socket
+import subprocess
+import sys
+import threading
 
 import numpy as np
 import pytest
@@ -160,6 +164,54 @@ def test_a_worker_tells_errors_in_words_and_can_be_cancelled(tmp_path):
 
     asyncio.run(asyncio.wait_for(work(), 600))
     assert len(omnidyn.read_log(tmp_path / "again.csv")) == 4001
+
+
+def test_stop_is_heard_whenever_it_is_pressed():
+    from omnidyn.studio.drive.state import Driving
+    from omnidyn.studio.session import Session
+
+    async def work():
+        session = Session()
+        session.robot, driving, worker = "axebot", Driving(session), session.workers["drive"]
+        moments = (  # before its process is there, before it can hear, at its first word
+            lambda: driving.running,
+            lambda: worker.busy,
+            lambda: driving.running and driving.robot is not None,
+        )
+        try:
+            for moment in moments:
+                task = asyncio.ensure_future(driving.run())
+                while not moment():
+                    await asyncio.sleep(0)
+                driving.send({"stop": True})
+                await asyncio.wait_for(task, 120)
+                assert not driving.running
+                assert driving.trouble == ""
+        finally:
+            await session.close()
+
+    asyncio.run(asyncio.wait_for(work(), 600))
+
+
+def test_a_command_that_comes_with_its_job_is_its_own_and_one_before_it_is_not(tmp_path):
+    request = {"robot": "axebot", "folder": str(tmp_path)}
+    job, stop = {"job": "drive", "request": request}, {"command": {"stop": True}}
+    lines = "".join(json.dumps(message) + "\n" for message in ({"command": {"record": 1, "x": 0}}, job, stop))
+    words = [sys.executable, "-m", "omnidyn.studio.jobs"]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        late = threading.Timer(200, process.kill)
+        late.start()
+        try:
+            process.stdin.write(lines.encode())
+            process.stdin.flush()
+            kinds = []
+            while "result" not in kinds and (line := process.stdout.readline()):
+                kinds += json.loads(line)
+        finally:
+            late.cancel()
+            process.kill()
+    assert kinds[-1] == "result"
+    assert "recorded" not in kinds
 
 
 def test_a_page_that_says_nothing_gets_few_frames_and_the_newest_when_it_is_back():

@@ -41,3 +41,25 @@ class SimulatedClock:
     def sleep_until(self, due: float) -> None:
         """Set it to that time."""
         self._now = max(self._now, due)
+
+
+LATE = 0.1  # [s]: what is more behind is not made up
+
+
+class PacedClock(SimulatedClock):
+    """A simulated clock that goes on so many times as fast as real time, for who looks on.
+
+    A machine that is busy slows it down: nothing that it times is late.
+    """
+
+    def __init__(self, pace: float = 1.0) -> None:
+        super().__init__()
+        self.pace, self._due = pace, time.monotonic()
+
+    def sleep_until(self, due: float) -> None:
+        """Set it to that time when it is so late in real time too."""
+        now = time.monotonic()
+        self._due = max(self._due + max(due - self._now, 0.0) / self.pace, now - LATE)
+        if self._due > now:
+            time.sleep(self._due - now)
+        super().sleep_until(due)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable
 from contextlib import suppress
+from typing import NamedTuple
 
 from omnidyn.arguments import check_order
+from omnidyn.arrays import FloatArray
 from omnidyn.driving.clock import DriveClock, RealClock
 from omnidyn.driving.connection import Command, RobotConnection
 from omnidyn.driving.guard import DriveGuard, Limits
@@ -15,6 +17,7 @@ from omnidyn.driving.record import DriveRecord
 from omnidyn.driving.recording import DriveRecording
 from omnidyn.errors import InputError
 from omnidyn.progress import Progress, Report, silent
+from omnidyn.run import Run
 from omnidyn.statement import WARNING, Statement
 
 ANSWERS_WITHIN = 3.0  # [s] for the first answer of a robot
@@ -30,6 +33,7 @@ def drive(
     clock: DriveClock | None = None,
     held: Callable[[], bool] | None = None,
     progress: Progress = silent,
+    follow: Callable[[DriveMoment], None] | None = None,
 ) -> DriveRecord:
     """Drive a robot through a program, and record it.
 
@@ -44,6 +48,7 @@ def drive(
         clock: Default: that of a simulated robot, else real time.
         held: Whether a key that must be held down still is.
         progress: Hears what is done.
+        follow: Hears where it is with each row, and at the end; it must return at once.
 
     Raises InputError for rows that are longer than half the dead-man time, for which a command acts.
 
@@ -67,11 +72,25 @@ def drive(
             remedy="take shorter rows, or a longer `dead_man`",
             where="program",
         )
-    return _Driver(program, connection, limits, clock or _clock_of(connection), held or (lambda: True), progress).run()
+    driver = _Driver(program, connection, limits, clock or _clock_of(connection), held or (lambda: True), progress)
+    driver.follow = follow or (lambda moment: None)
+    return driver.run()
 
 
 def _clock_of(connection: object) -> DriveClock:
     return getattr(connection, "clock", None) or RealClock()
+
+
+class DriveMoment(NamedTuple):
+    """Where a drive is, for who looks on.
+
+    rows: of the program that were sent. place (3,): in the room, by what is measured [m, m, rad]. new_rows: gives what
+    was recorded since it was asked last, None for nothing.
+    """
+
+    rows: int
+    place: FloatArray
+    new_rows: Callable[[], Run | None]
 
 
 class _Driver:
@@ -92,6 +111,7 @@ class _Driver:
         self.session, self.number = secrets.randbelow(2**31 - 1) + 1, 0
         self.rows, self.start, self.driven_at = 0, 0.0, float("-inf")
         self.off = (0.0,) * program.robot.wheels.count
+        self.follow: Callable[[DriveMoment], None] = lambda moment: None
 
     def run(self) -> DriveRecord:
         """All of it; whatever ends it, the robot is stopped."""
@@ -107,6 +127,7 @@ class _Driver:
             stopped = Statement("drive_line_broke", WARNING, numbers={"error": str(error.strerror or error)})
         finally:
             self._stop()
+        self._tell()
         run = self.recording.run(self.program.channel, self.program.source or self.program.robot.name)
         return DriveRecord(self.program, run, self.rows, stopped, self.driven_at)
 
@@ -116,6 +137,8 @@ class _Driver:
         began, dt, answered, slowest = self.clock.now(), self.program.dt, 0, 0.0
         sent = {0: began}
         for k in range(round(ANSWERS_WITHIN / dt)):
+            if not self.held():
+                return Statement("drive_released", WARNING)
             now = self.clock.now()
             sent.setdefault(self.number, now)
             self.connection.send(Command(self.session, self.number, now, 0.5 * self.limits.dead_man, self.off))
@@ -150,6 +173,7 @@ class _Driver:
                 return stopped
             self._send(tuple(row))
             self.rows, due = k + 1, self.start + (k + 1) * dt
+            self._tell()
             if k % max(round(1.0 / dt), 1) == 0:
                 self.progress(Report("driving", k, len(inputs)))
         return None
@@ -180,6 +204,12 @@ class _Driver:
         if late > self.limits.dead_man:
             return Statement("drive_slow_loop", WARNING, numbers={"seconds": late})
         return None
+
+    def _tell(self) -> None:
+        """Who looks on hears where it is."""
+        channel, source = self.program.channel, self.program.source or self.program.robot.name
+        moment = DriveMoment(self.rows, self.guard.odometry.place, lambda: self.recording.new_rows(channel, source))
+        self.follow(moment)
 
     def _send(self, inputs: tuple[float, ...]) -> None:
         now = self.clock.now()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +61,8 @@ class DriveGuard:
         self._heard = start
         self._last: Measured | None = None
         self._unanswered = deque[tuple[int, float]]()
-        self._travel = {"encoders": _Travel(), "body": _Travel()}
+        delay = program.robot.sensor_model.pose_delay
+        self._travel = {"encoders": _Travel(WINDOW + delay), "body": _Travel(WINDOW)}
         speed = np.asarray(program.predicted.wheel_speed)
         self._slips_since = np.full(program.robot.wheels.count, np.inf)  # time of each wheel [s]
         self._predicted = np.zeros_like(speed)
@@ -82,8 +84,8 @@ class DriveGuard:
             self._unanswered.popleft()
         self._last, self._heard = measured, now
         self.odometry.take(t, measured.channels)
-        for name, travel in self._travel.items():
-            travel.add(t, getattr(self.odometry, name))
+        self._travel["encoders"].add(t, self.odometry.encoders)
+        self._travel["body"].add(t - self.odometry.age, self.odometry.body)
 
     def fault(self, now: float) -> Statement | None:
         """Why to stop now; None for nothing."""
@@ -114,7 +116,7 @@ class DriveGuard:
 
     def _of_place(self) -> Statement | None:
         """The border: where it will be when the motors are off."""
-        ahead = self.odometry.place[:2] + self.limits.dead_man * self.odometry.speed
+        ahead = self.odometry.place[:2] + (self.odometry.age + self.limits.dead_man) * self.odometry.speed
         for axis, place, size in zip("xy", ahead.tolist(), self.program.area, strict=True):
             if abs(place) > 0.5 * size:
                 return _stop("drive_border", axis, place=place, border=0.5 * size)
@@ -125,15 +127,8 @@ class DriveGuard:
         went = {name: turned for name, travel in self._travel.items() if (turned := travel.turned()) is not None}
         if not went:
             return None
-        if len(went) == 2:
-            apart = np.abs(went["encoders"] - went["body"])
-            far = np.maximum(np.abs(went["encoders"]), np.abs(went["body"]))
-            slips = apart > SLIPS * np.maximum(far, 2.0 * self._judged)
-            time = self._travel["body"].time
-            self._slips_since = np.where(slips, np.minimum(self._slips_since, time), np.inf)
-            slips = np.flatnonzero(time - self._slips_since >= SLIPS_FOR)
-            if slips.size:
-                return _stop("drive_slip", wheel=int(slips[0]) + 1)
+        if (slipping := self._slipping(went)) is not None:
+            return _stop("drive_slip", wheel=slipping)
         turned = next(iter(went.values()))
         row = round((self._travel[next(iter(went))].time - self.start) / self.program.dt)
         rows = np.arange(row - round(FOLLOWS_WITHIN / self.program.dt), row + 1)
@@ -148,22 +143,36 @@ class DriveGuard:
         code = "drive_wrong_way" if along[wheel] < -FOLLOWS * abs(least[wheel]) else "drive_stuck"
         return _stop(code, wheel=wheel + 1)
 
+    def _slipping(self, went: Mapping[str, FloatArray]) -> int | None:
+        """The number of a wheel that turns otherwise than the body moves, for longer than noise does. went: by what
+        wheels measure, and by the body, which may be seen late."""
+        body = self._travel["body"]
+        encoders = self._travel["encoders"].turned(body.time) if len(went) == 2 else None
+        if encoders is None:
+            return None
+        far = np.maximum(np.abs(encoders), np.abs(went["body"]))
+        slips = np.abs(encoders - went["body"]) > SLIPS * np.maximum(far, 2.0 * self._judged)
+        self._slips_since = np.where(slips, np.minimum(self._slips_since, body.time), np.inf)
+        wheels = np.flatnonzero(body.time - self._slips_since >= SLIPS_FOR)
+        return int(wheels[0]) + 1 if wheels.size else None
+
     def _way(self, rows: np.ndarray) -> FloatArray:
         """How far each wheel turns in the window before these rows, as predicted [rad]. Shape (rows, wheels)."""
         return self._predicted[rows] - self._predicted[np.maximum(rows - self._back, 0)]
 
 
 class _Travel:
-    """How far wheels turned over the last WINDOW."""
+    """How far wheels turned over WINDOW. kept [s]: for which it is known."""
 
-    def __init__(self) -> None:
+    def __init__(self, kept: float) -> None:
+        self._kept = kept
         self._rows = deque[tuple[float, FloatArray]]()
 
     def add(self, t: float, angle: FloatArray | None) -> None:
         if angle is None or (self._rows and angle is self._rows[-1][1]):
             return
         self._rows.append((t, angle))
-        while len(self._rows) > 2 and t - self._rows[1][0] >= WINDOW:
+        while len(self._rows) > 2 and t - self._rows[1][0] >= self._kept:
             self._rows.popleft()
 
     @property
@@ -171,11 +180,13 @@ class _Travel:
         """Of the last angle."""
         return self._rows[-1][0]
 
-    def turned(self) -> FloatArray | None:
-        """None while it was not watched that long."""
-        if not self._rows or self._rows[-1][0] - self._rows[0][0] < 0.9 * WINDOW:
+    def turned(self, until: float = np.inf) -> FloatArray | None:
+        """Over the window that ends then; None while it was not watched that long."""
+        rows = [row for row in self._rows if row[0] <= until]
+        if not rows or rows[-1][0] - rows[0][0] < 0.9 * WINDOW:
             return None
-        return self._rows[-1][1] - self._rows[0][1]
+        first = next((angle for t, angle in reversed(rows) if rows[-1][0] - t >= WINDOW), rows[0][1])
+        return rows[-1][1] - first
 
 
 def _stop(code: str, subject: str = "", **numbers: float) -> Statement:

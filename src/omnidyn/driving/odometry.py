@@ -22,13 +22,18 @@ class Odometry:
     """
 
     def __init__(self, robot: Robot) -> None:
-        self._wheels = robot.wheels
+        self._wheels, self._delay = robot.wheels, robot.sensor_model.pose_delay
         self.place, self.speed = np.zeros(3), np.zeros(2)
         self.encoders: FloatArray | None = None
         self.body: FloatArray | None = None
         self._time: float | None = None
         self._first_angle: FloatArray | None = None
         self._pose: tuple[float, FloatArray] | None = None
+
+    @property
+    def age(self) -> float:
+        """How old the place is: [sensors] says how late poses are [s]."""
+        return self._delay if self._pose is not None else 0.0
 
     def take(self, t: float, channels: Mapping[str, FloatArray]) -> None:
         """What was measured at t [s]."""

@@ -30,7 +30,7 @@ CHANNELS = {DUTY: "duty", SPEED: "wheel_speed_command"}  # kind of drive -> chan
 UNITS = {"voltage": "V", "duty": "duty", "wheel_speed_command": "rad/s"}
 STILL = (0.005, np.radians(1.0))  # [m], [rad]: less is no way
 BACK = 0.2  # of its farthest way: a leg that comes back by more says so
-ROUNDING = 1e-9  # of a duty
+ROUNDING = 1e-9  # of a duty, of a limit
 LARGEST = 1000.0  # [m] of a side of a room
 TURN_ONLY = 0.1  # [m] a rad: less way beside a turn is not named
 
@@ -93,6 +93,21 @@ class DriveProgram(Displayable):
         if self.channel == "duty" and np.abs(rows).max() > 1.0 + ROUNDING:
             largest = f"{np.abs(rows).max():g}"
             raise InputError("a duty beyond the supply", got=largest, expected="-1 to 1", where="inputs")
+        if self.channel == "voltage":
+            self._check_volts(rows)
+
+    def _check_volts(self, rows: FloatArray) -> None:
+        limit = np.broadcast_to(np.asarray(self.robot.motor.voltage_limit, dtype=float), rows.shape[1])
+        beyond = np.abs(rows).max(axis=0) - limit
+        wheel = int(np.argmax(beyond))
+        if beyond[wheel] > ROUNDING * limit[wheel]:
+            raise InputError(
+                "volts beyond the limit of the motor",
+                got=f"{np.abs(rows[:, wheel]).max():g} V at wheel {wheel + 1}",
+                expected=f"at most {limit[wheel]:g} V, motor.voltage_limit_V of {self.robot.name}",
+                remedy="take smaller volts, or correct the limit in the robot file",
+                where="inputs",
+            )
 
     @property
     def channel(self) -> str:

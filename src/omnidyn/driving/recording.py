@@ -9,6 +9,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.driving.connection import Command, Measured
+from omnidyn.identification.live.rows import part
 from omnidyn.run import Run
 from omnidyn.sensors import CHANNELS, SCALAR
 
@@ -21,9 +22,9 @@ class DriveRecording:
     def __init__(self) -> None:
         self._sent: list[tuple[float, tuple[float, ...]]] = []
         self._measured: list[Measured] = []
-        self._difference = (
-            np.inf
-        )  # of the clock of the drive and that of the robot: of the measurement that came fastest
+        # Of the clock of the drive and that of the robot: of the measurement that came fastest
+        self._difference = np.inf
+        self._told, self._told_until = (0, 0), -np.inf
 
     def sent(self, now: float, command: Command) -> None:
         """A command that was sent."""
@@ -42,14 +43,31 @@ class DriveRecording:
         """The log; None where nothing was driven. channel: of the inputs."""
         if len(self._sent) < 2:
             return None
+        return self._rows(0, 0, channel, source)
+
+    def new_rows(self, channel: str, source: str) -> Run | None:
+        """What came since it was asked last, as rows that follow those; None for nothing. channel: of the inputs."""
+        if len(self._sent) < 2:
+            return None
+        run = self._rows(max(self._told[0] - 1, 0), self._told[1], channel, source)
+        self._told = (len(self._sent), len(self._measured))
+        fresh = np.flatnonzero(run.t > self._told_until)
+        if not fresh.size:
+            return None
+        self._told_until = float(run.t[-1])
+        return part(run, int(fresh[0]), len(run))
+
+    def _rows(self, first_sent: int, first_measured: int, channel: str, source: str) -> Run:
+        """The log from these on."""
+        commands, came = self._sent[first_sent:], self._measured[first_measured:]
         start = self._sent[0][0]
-        sent = _ticks([t - start for t, _ in self._sent])
-        measured = _ticks([self.time_of(one) - start for one in self._measured])
-        kept = (measured >= 0) & (measured >= np.maximum.accumulate(measured))
+        sent = _ticks([t - start for t, _ in commands])
+        measured = _ticks([self.time_of(one) - start for one in came])
+        kept = (measured >= sent[0]) & (measured >= np.maximum.accumulate(measured))
         ticks = np.unique(np.concatenate([sent, measured[kept]]))
-        inputs = np.array([values for _, values in self._sent])
+        inputs = np.array([values for _, values in commands])
         rows: dict[str, Any] = {channel: inputs[np.searchsorted(sent, ticks, side="right") - 1]}
-        found = [(int(tick), one) for tick, one, keep in zip(measured, self._measured, kept, strict=True) if keep]
+        found = [(int(tick), one) for tick, one, keep in zip(measured, came, kept, strict=True) if keep]
         for name in dict.fromkeys(name for _, one in found for name in one.channels):
             values = [(tick, one.channels[name]) for tick, one in found if name in one.channels]
             rows[name] = _column(name, values, ticks)

@@ -7,12 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from omnidyn.arrays import FloatArray
 from omnidyn.driving.program import DriveProgram
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.run import Run
 
 SHORTEST = 3.0  # [s] that are worth a drive
-SAME, SAME_SHARE = 1e-3, 0.8  # of the largest input; of the rows: a row may be late
+SAME, SAME_SHARE = 1e-3, 0.8  # of the largest input; of the rows: a row may be left out of a log
+LATE, SLOWER = (
+    0.5,
+    0.25,
+)  # [s] that a row may be late beside the one before; of the time: that all of it may take longer
 REMEDY = "give the logs of this program in the order in which they were driven"
 
 
@@ -57,15 +62,33 @@ def _driven_rows(program: DriveProgram, run: Run) -> int:
     if not complete.size:
         raise InputError("a log without inputs", got="empty cells", expected=expected, remedy=REMEDY, where="resume")
     t, inputs = run.t[complete] - run.t[complete[0]], inputs[complete]
-    at = np.arange(min(round(t[-1] / program.dt), len(program.inputs))) * program.dt
-    driven, asked = inputs[np.searchsorted(t, at + 1e-6, side="right") - 1], program.inputs[: len(at)]
-    same = (np.abs(driven - asked) <= SAME * np.abs(program.inputs).max()).all(axis=1)
-    if len(at) and same.mean() < SAME_SHARE:
+    rows, same = _matched(program, t, inputs)
+    if rows and same < SAME_SHARE * rows:
         raise InputError(
             "not a log of this program",
-            got=f"{same.mean():.0%} of its rows are those of the program",
+            got=f"{same / rows:.0%} of its rows are those of the program",
             expected=f"{SAME_SHARE:.0%} or more",
             remedy=REMEDY,
             where="resume",
         )
-    return len(at)
+    return rows
+
+
+def _matched(program: DriveProgram, t: FloatArray, inputs: FloatArray) -> tuple[int, int]:
+    """How many rows of a program a log holds, and how many of them are the same.
+
+    A loop that was held up goes on from there, so rows come later and later: where one is not there when it is due, it
+    is looked for in the LATE seconds after that.
+    """
+    near, dt, late, rows, same = SAME * np.abs(program.inputs).max(), program.dt, 0.0, 0, 0
+    while rows < len(program.inputs) and rows * dt + late < t[-1] - 0.5 * dt:
+        due, asked = rows * dt + late, program.inputs[rows]
+        first = int(np.searchsorted(t, due + 1e-6, side="right")) - 1
+        last = int(np.searchsorted(t, min(due + LATE, rows * dt * (1.0 + SLOWER) + LATE), side="right"))
+        for row in range(first, max(last, first + 1)):
+            if np.abs(inputs[row] - asked).max() <= near:
+                late = max(late, float(t[row]) - rows * dt)
+                same += 1
+                break
+        rows += 1
+    return rows, same

@@ -74,6 +74,7 @@ class SimulatedRobot:
         self._deaf = self._mute = self._halted = False
         self._silent_until, self._jump = -np.inf, 0.0
         self.last_driven = -np.inf  # when a motor got something the last time, on the clock of the drive [s]
+        self._sensors = robot.sensor_model
         self._begun = False
 
     def open(self) -> None:
@@ -81,6 +82,7 @@ class SimulatedRobot:
         self.live = LiveRobot(self.robot, self.period, supply=self._supply or None)
         self._time = self._start = self._boot = self.clock.now()
         self._tick, self._angle = 0, np.zeros(self.robot.wheels.count)
+        self._poses, self._frame = deque([(self._time, self.live.pose.copy())]), -np.inf
         self._dead_man = DeadMan(self.robot.wheels.count)
         self._arriving: list[tuple[float, int, Command | None]] = []
         self._leaving: list[tuple[float, int, Measured]] = []
@@ -160,6 +162,7 @@ class SimulatedRobot:
         self.live.step(np.where(self._alive, self._sign * inputs, 0.0), seconds)
         self._angle += 0.5 * seconds * self._alive * (before + self.live.wheel_speed)
         self._time = until
+        self._poses.append((until, self.live.pose.copy()))
 
     def _take(self, command: Command | None) -> None:
         if self._time < self._silent_until:
@@ -183,12 +186,28 @@ class SimulatedRobot:
                 exact = settled_currents(self.robot, live.twist, reaching(self.robot, live.voltage))
             else:
                 exact = live.wheel_speed * turns if channel == "wheel_speed" else getattr(live, channel)
+            if channel == "pose" and (exact := self._new_pose()) is None:
+                continue
             channels[channel] = exact + std * self._rng.standard_normal(len(std))
         if self._supply:
             channels["supply"] = np.array([self._supply])
         measured = Measured(self._own_time(), self._dead_man.session, self._dead_man.number, channels)
         self._count += 1
         heapq.heappush(self._leaving, (self._time + self.delay, self._count, measured))
+
+    def _new_pose(self) -> FloatArray | None:
+        """The newest pose that has arrived, as late and as often as [sensors] says; None where that came before."""
+        at = self._time - self._sensors.pose_delay - self._start
+        if rate := self._sensors.pose_rate:
+            at = np.floor(at * rate + EDGE) / rate
+        if at <= self._frame:
+            return None
+        self._frame = at
+        while len(self._poses) > 1 and self._poses[1][0] <= at + self._start:
+            self._poses.popleft()
+        (before, pose), (after, next_pose) = self._poses[0], self._poses[min(1, len(self._poses) - 1)]
+        share = np.clip((at + self._start - before) / (after - before), 0.0, 1.0) if after > before else 0.0
+        return pose + share * (next_pose - pose)
 
     def _begin(self, fault: Fault) -> None:
         """A fault begins."""

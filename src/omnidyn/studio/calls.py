@@ -175,6 +175,18 @@ def drive(robot: str) -> tuple[str, str]:
     return "\n".join(map(shlex.join, words)), python
 
 
+def plan(robot: str, area: Sequence[float], seconds: float, to: str, log: str) -> tuple[str, str]:
+    """Command lines and Python calls that plan a drive, and drive it. to: "" for a simulated robot. log: to write."""
+    name, variable, made = _robot(robot)
+    room = "x".join(f"{size:g}" for size in area)
+    planned = ["omnidyn", "plan", name, "--area", room, "--time", f"{seconds:g}", "-o", "plan.csv"]
+    driven = ["omnidyn", "drive", "plan.csv", *(["--to", to, "--hold"] if to else []), "-o", log]
+    python = f"{made}omnidyn.plan({variable}, {tuple(area)!r}, {seconds:g})"
+    if not to:
+        python += f"\nomnidyn.drive(omnidyn.read_program('plan.csv'), omnidyn.SimulatedRobot({variable}))"
+    return "\n".join(map(shlex.join, (planned, driven))), python
+
+
 def _robot(robot: str) -> tuple[str, str, str]:
     """Its name without a folder, the variable that holds it, and the line of Python that makes it; "" for none."""
     name = Path(robot).name

@@ -22,6 +22,7 @@ from omnidyn.studio.fit.job import fit, free_keys, warm
 from omnidyn.studio.job import Tell
 from omnidyn.studio.live.job import watch
 from omnidyn.studio.log.job import align, check, example, save_columns
+from omnidyn.studio.planned.job import drive_plan, follow, plan
 from omnidyn.studio.robot.job import check_robot
 from omnidyn.studio.track.job import track
 from omnidyn.studio.worker import Listener
@@ -40,6 +41,9 @@ JOBS: dict[str, Callable[[Mapping[str, Any], Tell, Any], dict[str, Any]]] = {
     "compare": compare,
     "drift": drift,
     "watch": watch,
+    "plan": plan,
+    "drive_plan": drive_plan,
+    "follow": follow,
 }
 
 
@@ -70,13 +74,13 @@ def main() -> None:
             elif "command" in message:
                 commands.put(message["command"])
             else:
+                while not commands.empty():  # to the job before
+                    commands.get()
                 messages.put(message)
         os._exit(0)  # the server is gone: nobody waits for the job
 
     threading.Thread(target=read, daemon=True).start()
     while (message := _next(messages)) is not None:
-        while not commands.empty():
-            commands.get()
         working.set()
         try:
             kind, value = _answer(message, tell, commands)

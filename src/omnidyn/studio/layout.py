@@ -21,6 +21,7 @@ from omnidyn.studio.live.state import Watching
 from omnidyn.studio.log.tab import LogTab
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import FIT, LOGS, PROGRESS, ROBOT
+from omnidyn.studio.planned.state import Planned
 from omnidyn.studio.robot.tab import RobotTab
 from omnidyn.studio.session import Session
 from omnidyn.studio.steps import MARKS, StepState, following, steps
@@ -45,7 +46,7 @@ class Studio:
         self.session = Session()
         self.fitting, self.driving = Fitting(self.session), Driving(self.session)
         self.tracks, self.comparing = Tracks(self.session), Comparing(self.session)
-        self.watching = Watching(self.session)
+        self.watching, self.planned = Watching(self.session), Planned(self.session)
 
         self.session.takers[workspace.SUFFIX] = self.open
 
@@ -76,7 +77,7 @@ class Studio:
             "Log": LogTab(page, self.watching),
             "Robot": RobotTab(page),
             "Fit": FitTab(page, self.fitting),
-            "Drive": DriveTab(page, self.driving),
+            "Drive": DriveTab(page, self.driving, self.planned),
             "Track": TrackTab(page, self.tracks),
             "Compare": CompareTab(page, self.comparing),
         }

@@ -29,6 +29,7 @@ from omnidyn.studio import script, workspace
 from omnidyn.studio.drive.state import Driving
 from omnidyn.studio.guard import Guard
 from omnidyn.studio.layout import Studio, show
+from omnidyn.studio.planned.state import Planned
 from omnidyn.studio.session import RefusedError
 
 LOCAL = "127.0.0.1"
@@ -113,6 +114,7 @@ def application(studio: Studio, files: list[str]) -> FastAPI:
     app.mount("/static", StaticFiles(directory=STATIC))
     _add_files(app, studio)
     _add_sockets(app, studio)
+    _add_key(app, studio.planned)
 
     @ui.page("/", title="omnidyn studio")
     def page(tab: str = "") -> None:
@@ -249,6 +251,37 @@ def _add_sockets(app: FastAPI, studio: Studio) -> None:
             driving.fresh.discard(fresh)
             if not driving.fresh:
                 driving.send({"axes": [0.0, 0.0, 0.0], "level": 0.0})  # nobody holds a key any more
+
+
+def _add_key(app: FastAPI, planned: Planned) -> None:
+    """The key of a plan that is driven: a page that is gone holds it no more."""
+
+    @app.websocket("/planned")
+    async def key(socket: WebSocket) -> None:
+        """Where the robot is out, the newest; whether the key is held in."""
+        await socket.accept()
+        fresh = asyncio.Event()
+        planned.fresh.add(fresh)
+
+        async def send() -> None:
+            with contextlib.suppress(*CLOSED):
+                while True:
+                    await fresh.wait()
+                    fresh.clear()
+                    await socket.send_json(planned.frame)
+
+        sender = asyncio.create_task(send())
+        try:
+            with contextlib.suppress(*CLOSED, *NONSENSE):
+                while True:
+                    said = await socket.receive_json()
+                    if said.get("pressed") is True:
+                        planned.press(socket)
+                    planned.hold(socket, said.get("held") is True)
+        finally:
+            sender.cancel()
+            planned.fresh.discard(fresh)
+            planned.hold(socket, held=False)
 
 
 def _take(driving: Driving, command: Any) -> None:

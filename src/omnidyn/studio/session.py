@@ -21,7 +21,7 @@ from omnidyn.errors import InputError
 from omnidyn.model.presets import robot_path
 from omnidyn.progress import Report
 from omnidyn.studio.calls import LogFile, safe_name
-from omnidyn.studio.parts import COMPARE, FIT, LOGS, PROGRESS, ROBOT, TRACK, WATCH
+from omnidyn.studio.parts import COMPARE, FIT, LOGS, PLAN, PROGRESS, ROBOT, TRACK, WATCH
 from omnidyn.studio.removed import Removed
 from omnidyn.studio.series import META, Series
 from omnidyn.studio.words import each_text, in_page_names, without_folders
@@ -51,9 +51,11 @@ class Session:
         self.robot = ""
         self.series: dict[str, Series] = {}
         self.listeners: set[Callable[[str], None]] = set()
-        self.workers = {name: Worker() for name in ("log", "fit", "drive", TRACK, COMPARE, WATCH, "warm")}
+        self.workers = {name: Worker() for name in ("log", "fit", "drive", TRACK, COMPARE, WATCH, PLAN, "warm")}
         self.others = 0  # files that are neither logs nor robots
         self.made = set[str]()  # keys of logs and names of robots that were made here, not brought: no edit takes them
+        # key of a log -> key of a number -> what the plan of its drive promised, in the middle and at the worst
+        self.promises: dict[str, dict[str, list[float | None]]] = {}
         self.removed: Removed | None = None
         self.takers: dict[str, Callable[[str, str], object]] = {"": self.add_log, ROBOT_SUFFIX: self.take_robot}
         self.count, self._bytes, self._tasks = 0, 0, set[asyncio.Task[Any]]()

@@ -22,9 +22,18 @@ PAGE_NAMES = {  # option of a call -> where a page has it
     "ladder": "--ladder",
     "loss": "--loss",
     "nuisances": "--nuisances",
+    "resume": "“It stands in the middle again: go on”",
     "unit": "in unit (tab Log, Columns and units)",
 }
-AS_WRITTEN = ("columns", "key", "numbers", "reading", "unused", "values")  # of a result: no words of the library
+AS_WRITTEN = (
+    "columns",
+    "key",
+    "learnt",
+    "numbers",
+    "reading",
+    "unused",
+    "values",
+)  # of a result: no words of the library
 CELLS = ("head", "rows")  # of a table: keys stand there
 AXES = ("vx", "vy", "omega")
 CHANNEL_NAMES = {"twist": "speed over the ground", "wheel_speed": "wheel speeds", "wheel_angle": "wheel angles"}

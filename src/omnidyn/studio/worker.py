@@ -47,6 +47,8 @@ class Worker:
         self._process: asyncio.subprocess.Process | None = None
         self._lock = asyncio.Lock()
         self.busy = self._is_cancelled = False
+        self._waiting, self._hears = 0, False  # jobs that were asked for; whether one of them takes commands now
+        self._early = list[Any]()  # commands to the job that is about to begin
 
     async def run(self, job: str, request: Any, listen: Listener) -> Any:
         """The result of a job, when those before it are done. listen: gets each kind of message and what it holds.
@@ -54,6 +56,14 @@ class Worker:
         Raises JobError with the words of an error, EndedError where the process ended, CancelledError for a job that
         was cancelled without a result.
         """
+        self._waiting += 1
+        try:
+            return await self._run(job, request, listen)
+        finally:
+            self._waiting -= 1
+            self._early *= bool(self._waiting)
+
+    async def _run(self, job: str, request: Any, listen: Listener) -> Any:
         async with self._lock:
             self.busy, self._is_cancelled = True, False
             try:
@@ -105,8 +115,17 @@ class Worker:
         return process
 
     async def _result(self, process: asyncio.subprocess.Process, job: str, request: Any, listen: Listener) -> Any:
-        assert process.stdout is not None
         self.send({"job": job, "request": request})
+        self._hears, early, self._early = True, self._early, []
+        try:
+            for command in early:
+                self.command(command)
+            return await self._answer(process, listen)
+        finally:
+            self._hears = False
+
+    async def _answer(self, process: asyncio.subprocess.Process, listen: Listener) -> Any:
+        assert process.stdout is not None
         while line := await process.stdout.readline():
             try:
                 message = json.loads(line)
@@ -122,6 +141,13 @@ class Worker:
         if self._is_cancelled:
             raise CancelledError
         raise EndedError(code)
+
+    def command(self, value: Any) -> None:
+        """Give a command to the job that is at work, or else to the one that is about to begin."""
+        if self._hears:
+            self.send({"command": value})
+        elif self._waiting:
+            self._early.append(value)
 
     def send(self, message: dict[str, Any]) -> None:
         """Send a message to the process, where it runs."""

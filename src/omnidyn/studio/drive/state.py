@@ -28,6 +28,10 @@ class Driving:
         """Drive the robot until it is stopped."""
         if self.running or not self.session.robot_path:
             return
+        if self.session.workers["drive"].busy:
+            self.trouble = "A plan is driven now: let its key go first."
+            self.session.changed(DRIVE)
+            return
         folder = self.session.new_folder()
         self.running, self.robot, self.trouble = True, None, ""
         self.session.changed(DRIVE, VIEW)
@@ -65,6 +69,6 @@ class Driving:
         if self.running:
             if "record" in command:
                 self.recording = bool(command["record"])
-            self.session.workers["drive"].send({"command": command})
+            self.session.workers["drive"].command(command)
             if "record" in command:
                 self.session.changed(DRIVE)

@@ -1,4 +1,4 @@
-"""Tab Drive: the robot from above, driven by hand, and its recordings."""
+"""Tab Drive: the robot from above, driven by hand, and its recordings; or a plan that is driven."""
 
 from __future__ import annotations
 
@@ -12,21 +12,34 @@ from omnidyn.studio.drive.state import Driving
 from omnidyn.studio.elements import verdict
 from omnidyn.studio.page import Page
 from omnidyn.studio.parts import DRIVE, NUMBERS, ROBOT, VIEW
+from omnidyn.studio.planned.card import PlanCard
+from omnidyn.studio.planned.state import Planned
+
+BY_HAND, A_PLAN = "By hand", "A plan"
 
 
 class DriveTab:
     """The tab of one page."""
 
-    def __init__(self, page: Page, drive: Driving) -> None:
-        self.page, self.session, self.drive = page, page.session, drive
+    def __init__(self, page: Page, drive: Driving, planned: Planned) -> None:
+        self.page, self.session, self.drive, self.planned = page, page.session, drive, planned
         self.view: ui.element | None = None
 
     def build(self) -> None:
         """Lay it out."""
         self.page.part(self.page.robot_choice, ROBOT, of=self.page.robots)
-        self.page.part(self._content, DRIVE, ROBOT)
-        self.page.part(self._view, VIEW)
-        self.page.part(self._calls, ROBOT)
+        mode = ui.toggle(
+            [BY_HAND, A_PLAN], value=A_PLAN if self.planned.last.running or self.planned.is_planned else BY_HAND
+        )
+        mode.props("no-caps dense unelevated aria-label='what is driven'")
+        with ui.element("div").classes("mode") as by_hand:
+            self.page.part(self._content, DRIVE, ROBOT)
+            self.page.part(self._view, VIEW)
+            self.page.part(self._calls, ROBOT)
+        with ui.element("div").classes("mode") as of_plan:
+            PlanCard(self.page, self.planned).build()
+        by_hand.bind_visibility_from(mode, "value", value=BY_HAND)
+        of_plan.bind_visibility_from(mode, "value", value=A_PLAN)
         self.page.parts[NUMBERS] = [self._numbers]
 
     def _content(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,7 +12,7 @@ from typing import Any
 
 import omnidyn
 from omnidyn.comparison.traces import unit as unit_of
-from omnidyn.document import Table, interval_cell
+from omnidyn.document import Table, interval_cell, percent_cell
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.estimate import NOT_DETERMINED, Estimate
 from omnidyn.identification.fit_document import difference_table, number_table
@@ -19,6 +20,7 @@ from omnidyn.identification.identification import Identification
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.prepare import free_by_default, guesses
+from omnidyn.identification.planning.got import Got, beside
 from omnidyn.model.keys import EMF, ROTOR, TORQUE, Key, find_key, in_words, unit
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
@@ -47,7 +49,8 @@ def fit(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]
     """What `omnidyn identify` says of logs: verdict, numbers, advice; writes robot, report, table and series.
 
     request: "robot", "logs" (path, name, map, unsigned each), "hold_out" (names), "free" (keys, or none for the
-    default), "groups" (of each log, or none), "folder" of the results.
+    default), "groups" (of each log, or none), "promises" (of the plan of a log: key -> half an interval, in the middle
+    and at the worst), "folder" of the results.
     """
     with timed(tell, PARTS) as listen:
         return _fitted(request, listen)
@@ -75,7 +78,7 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
         omnidyn.save_robot(estimates[group].robot, folder / file)
     _ = result.after  # what follows a fit is made here, where its progress is heard
     listen(Report("drawing"))
-    table = _with_before(_numbers(estimates), robot)
+    table = _with_before(_numbers(estimates, request.get("promises") or {}), robot)
     said = dict.fromkeys(warning for estimate in estimates.values() for warning in estimate.warnings)
     warnings = [{"severity": warning.severity, "text": str(warning)} for warning in said]
     (folder / "numbers.csv").write_text(_csv(table), "utf-8")
@@ -112,13 +115,22 @@ def gravest(statements: Sequence[Statement]) -> str:
     return min((statement.severity for statement in statements), key=SEVERITIES.index)
 
 
-def _numbers(estimates: Mapping[str, Estimate]) -> Table:
-    """Every number with its interval, and behind it its group where there are several."""
+def _numbers(estimates: Mapping[str, Estimate], promises: Mapping[str, Sequence[float | None]]) -> Table:
+    """Every number with its interval, and behind it its group where there are several; beside it what a plan promised,
+    where there was one: half an interval, in the middle and at the worst."""
     tables = {group: _numbers_of(estimate) for group, estimate in estimates.items()}
+    if promises:
+        promised = {key: (_share(half), _share(worst)) for key, (half, worst) in promises.items()}
+        tables = {group: _with_plan(table, beside(promised, estimates[group])) for group, table in tables.items()}
     rows = [
         (f"{row[0]} ({group})" if group else row[0], *row[1:]) for group, table in tables.items() for row in table.rows
     ]
     return replace(next(iter(tables.values())), rows=rows)
+
+
+def _share(value: float | None) -> float:
+    """A share as a result has it for JSON."""
+    return math.inf if value is None else value
 
 
 def _differences(result: Identification) -> dict[str, Any]:
@@ -152,6 +164,16 @@ def _with_before(table: Table, robot: Robot | None) -> Table:
     before = [_number_of(row[1], robot) for row in table.rows]
     rows = [(*row[:5], old, *row[5:]) for row, old in zip(table.rows, before, strict=True)]
     return replace(table, head=(*table.head[:5], "before", *table.head[5:]), rows=rows)
+
+
+def _with_plan(table: Table, got: Mapping[str, Got]) -> Table:
+    """The table, and beside each number how well a plan promised that it will be known, and how well it is."""
+    cells = [
+        f"{percent_cell(got[row[1]].planned)}, {percent_cell(got[row[1]].got)}" if row[1] in got else ""
+        for row in table.rows
+    ]
+    rows = [(*row[:5], cell, *row[5:]) for row, cell in zip(table.rows, cells, strict=True)]
+    return replace(table, head=(*table.head[:5], "planned, got +- %", *table.head[5:]), rows=rows)
 
 
 def _number_of(name: str, robot: Robot | None) -> str:

@@ -190,9 +190,10 @@ class Fitting:
             "hold_out": [log.request["name"] for log in held_out],
             "free": free,
             "groups": [*groups.values()],
+            "promises": next((self.session.promises[log.key] for log in logs if log.key in self.session.promises), {}),
             "command": command,
         }
-        self.session.workers["fit"].send({"command": "fit"})  # what warms up makes way
+        self.session.workers["fit"].command("fit")  # what warms up makes way
         await fit.run(self.session, FIT, "fit", "fit", request)
         if fit.result is not None:
             self.keep(fit, recipe=recipe)

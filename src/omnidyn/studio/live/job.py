@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from omnidyn.document import plain, sentence
@@ -40,10 +40,14 @@ def watch(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, An
     return shown(live.status)
 
 
-def shown(status: LiveStatus) -> dict[str, Any]:
-    """What a page shows of an answer: verdict, what is said beside it, and the numbers that must be known."""
+def shown(status: LiveStatus, expected: Collection[str] = ()) -> dict[str, Any]:
+    """What a page shows of an answer: verdict, what is said beside it, and the numbers that must be known.
+
+    expected: codes of what need not be said.
+    """
     numbers = [
         {
+            "key": key,
             "name": in_words(key),
             "unit": unit(key),
             "value": number.value,
@@ -60,7 +64,7 @@ def shown(status: LiveStatus) -> dict[str, Any]:
             "verdict": sentence(f"{verdict}"),
             "severity": verdict.severity,
             "enough": status.is_enough,
-            "said": [[said.severity, str(said)] for said in status.statements()],
+            "said": [[said.severity, str(said)] for said in status.statements() if said.code not in expected],
             "seconds": status.seconds,
             "numbers": numbers,
         }

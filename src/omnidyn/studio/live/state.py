@@ -23,7 +23,6 @@ class Watching:
 
     session: Session
     running: bool = False
-    stopping: bool = False
     log: str = ""
     within: float = WITHIN
     status: dict[str, Any] | None = None
@@ -46,13 +45,11 @@ class Watching:
         if self.running or self.why_not():
             return
         session = self.session
-        self.running, self.stopping, self.log, self.status, self.trouble = True, False, log.key, None, ""
+        self.running, self.log, self.status, self.trouble = True, log.key, None, ""
         self.command, self.python = calls.watch(log, session.robot_path, self.within)
         session.changed(WATCH, LIVE)
 
         def listen(kind: str, value: Any) -> None:
-            if self.stopping:  # asked for before the job could hear it
-                self.stop()
             if kind == "live":
                 self.status = session.without_paths(value)
                 session.changed(LIVE)
@@ -71,5 +68,4 @@ class Watching:
 
     def stop(self) -> None:
         """End it."""
-        self.stopping = True
-        self.session.workers[WATCH].send({"command": "stop"})
+        self.session.workers[WATCH].command("stop")

@@ -64,15 +64,15 @@ class Strip:
         verdict(status["severity"], f"{name}: {status['verdict']}", "live-verdict")
         with ui.element("div").classes("meters").props("id=meters"):
             for number in status["numbers"]:
-                _bar(number)
+                bar(number)
         for severity, words in status["said"]:
             ui.label(f"{severity}: {words}").classes("text")
         if not watching.running:
             self.page.calls(watching.command, watching.python, "call-watch", "The same by hand (watch)")
 
 
-def _bar(number: dict[str, Any]) -> None:
-    """How wide the interval of a number is, and how wide it may be."""
+def bar(number: dict[str, Any], promised: float | None = None) -> None:
+    """How wide the interval of a number is, how wide it may be, and how wide a plan promised that it will be."""
     half, within = number["half"], number["within"]
     width = 1.0 if half is None else min(half / within / WIDE, 1.0)
     now = (
@@ -81,10 +81,14 @@ def _bar(number: dict[str, Any]) -> None:
         else f"{number['value']:.3g} {number['unit']} ± {100.0 * half:.2g} %".replace("  ", " ")
     )
     words = f"{now}, wanted ± {100.0 * within:.2g} %"
+    words += "" if promised is None else f", planned ± {100.0 * promised:.2g} %"
     ui.label(number["name"])
     with ui.element("div").classes("meter").props("role=meter") as meter:
         meter._props |= {"aria-label": f"{number['name']}: {words}", "aria-valuemin": "0", "aria-valuemax": "100"}
         meter._props |= {"aria-valuenow": f"{100.0 * width:.0f}"}
         ui.element("div").classes("width" + " reached" * number["reached"]).style(f"width: {100.0 * width:.1f}%")
         ui.element("div").classes("wanted").style(f"left: {100.0 / WIDE:.1f}%")
+        if promised is not None:
+            left = 100.0 * min(promised / within / WIDE, 1.0)
+            ui.element("div").classes("promised").style(f"left: {left:.1f}%")
     ui.label(("✓ " if number["reached"] else "") + words)

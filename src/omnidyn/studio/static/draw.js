@@ -39,3 +39,30 @@ export function save(canvas, name) {
   const link = document.createElement('a');
   link.href = copy.toDataURL('image/png'); link.download = name; link.click();
 }
+
+// A grid, and how metres become pixels: x to the right, y up
+export function grid(g, width, height, at, scale, low) {
+  const cell = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10].find((c) => c * scale > 40) || 20;
+  g.strokeStyle = css('--line'); g.lineWidth = 1;
+  for (let k = Math.floor(low[0] / cell); k * cell < low[0] + width / scale; k++) { const [x] = at(k * cell, 0); g.beginPath(); g.moveTo(x, 0); g.lineTo(x, height); g.stroke(); }
+  for (let k = Math.floor(low[1] / cell); k * cell < low[1] + height / scale; k++) { const [, y] = at(0, k * cell); g.beginPath(); g.moveTo(0, y); g.lineTo(width, y); g.stroke(); }
+  g.fillStyle = css('--ink'); g.textAlign = 'left'; g.textBaseline = 'alphabetic';
+  g.fillText(`grid ${cell} m, x to the right, y up`, 8, height - 8);
+}
+
+export function line(g, points, at) { g.beginPath(); for (const [x, y] of points) g.lineTo(...at(x, y)); g.stroke(); }
+
+// An element that draws itself again when its size changes, or the page turns dark
+export class Picture extends HTMLElement {
+  connectedCallback() {
+    if (!this.canvas) this.build();
+    const size = new ResizeObserver(() => this.draw()), look = new MutationObserver(() => this.draw());
+    size.observe(this); look.observe(document.body, { attributes: true, attributeFilter: ['class'] });
+    this.leave = () => { size.disconnect(); look.disconnect(); };
+  }
+  disconnectedCallback() { this.leave(); }
+  picture(words) {
+    this.canvas = make('canvas', this);
+    this.canvas.setAttribute('role', 'img'); this.canvas.setAttribute('aria-label', words);
+  }
+}

@@ -4,6 +4,7 @@ import './drop.js';
 import './plot.js';
 import './drive.js';
 import './robot.js';
+import './run.js';
 import './track.js';
 
 document.documentElement.lang = 'en';
