@@ -5,6 +5,7 @@ import pytest
 
 import omnidyn
 from omnidyn.logs.growing import FIRST_ROWS, GrowingTable
+from omnidyn.logs.read_log import LogOptions
 
 HEAD = "t_s,u1_V,u2_V,u3_V,x_m,y_m,heading_rad\n"
 
@@ -82,3 +83,31 @@ def test_what_is_no_table_is_refused(table):
         table.feed("".join(f"hello {k}\n" for k in range(FIRST_ROWS + 5)))
     with pytest.raises(omnidyn.OmnidynError, match=r"a line does not end; got .*; expected rows of text"):
         GrowingTable("pipe").feed("1" * (2 << 20))
+
+
+@pytest.mark.parametrize("rows", [1, 7, 40])
+@pytest.mark.parametrize(
+    ("reading", "resets", "slack"),
+    [
+        (lambda count, k: (count + 32768) % 65536 - 32768, 0, 1e-6),
+        (lambda count, k: count - 25_357 * (k > 205), 1, 30.0),
+    ],
+    ids=["two bytes", "set to zero"],
+)
+def test_counters_go_on_from_block_to_block(axebot, reading, resets, slack, rows):
+    """Wheels at 40 rad/s and more: the angle that was turned, however few rows come at once."""
+    count = np.floor(np.outer(np.arange(400) ** 1.05, [200.0, 260.0, -230.0])).astype(int)
+    head = "t_s,u1_V,u2_V,u3_V,a1,a2,a3\n"
+    lines = [
+        f"{0.01 * k:.2f},1,2,{0.1 * (k % 7):.1f}," + ",".join(str(reading(c, k)) for c in counts) + "\n"
+        for k, counts in enumerate(count.tolist())
+    ]
+    table = GrowingTable("log.csv", axebot, LogOptions(assume={"a": "ticks/4096"}))
+    runs = table.feed(head + "".join(lines[: FIRST_ROWS + 1]))
+    for first in range(FIRST_ROWS + 1, len(lines), rows):
+        runs += table.feed("".join(lines[first : first + rows]))
+    turned = np.concatenate([run.wheel_angle for run in runs]) * 4096.0 / (2.0 * np.pi)
+    kept = np.round(100.0 * joined(runs)).astype(int)  # beside a counter that was set, rows may be left out
+    assert len(kept) > 390
+    assert np.abs(turned - turned[0] - (count[kept] - count[0])).max() < slack
+    assert table.resets == resets

@@ -21,6 +21,7 @@ from omnidyn.document import sentence
 from omnidyn.errors import InputError
 
 if TYPE_CHECKING:
+    from omnidyn.identification.live.live import Live
     from omnidyn.identification.live.status import LiveStatus
     from omnidyn.logs.growing import GrowingTable
     from omnidyn.run import Run
@@ -49,8 +50,8 @@ def watch(
 ) -> None:
     """Say each second what a log tells while it grows: numbers, intervals, and whether that is enough.
 
-    Ctrl-C, the end of the input or --idle end it; then all numbers are shown. Gaps, restarts and lines that are no rows
-    are survived, and said. Exit code 4 where it ends before it is enough.
+    Ctrl-C, the end of the input or --idle end it; then all rows are fitted once more and all numbers shown. Gaps,
+    restarts and lines that are no rows are survived, and said. Exit code 4 where it ends before it is enough.
     """
     from omnidyn.identification.live.live import Live
     from omnidyn.identification.methods import OutputError
@@ -62,7 +63,7 @@ def watch(
     before = omnidyn.load_robot(reference) if reference else None
     method = OutputError(free=tuple(free), nuisances=("latency", "push")) if free else None
     live = Live(given, method, within=within / 100.0, reference=before)
-    table, told_bad = GrowingTable(source, given, flags.options()), 0
+    table, told_bad, told_resets = GrowingTable(source, given, flags.options()), 0, 0
 
     def is_over(runs: list[Run]) -> bool:
         """Take runs, and tell each second of them; whether that is enough, and all that was asked for."""
@@ -82,6 +83,9 @@ def watch(
             is_first, runs = table.columns is None, table.feed(text)
             if is_first and table.columns is not None:
                 maps.show(source, table.columns)
+            if table.resets > told_resets:
+                told_resets = table.resets
+                say(f"omnidyn: warning: an encoder was set to another value, {told_resets} times so far: it goes on")
             if table.bad_rows > 2 * told_bad:
                 told_bad = _tell_bad(table)
             if is_over(runs):
@@ -96,11 +100,21 @@ def watch(
         raise
     if table.bad_rows > told_bad:
         _tell_bad(table)
-    status = live.status
-    if not json:
+    status = live.status if until_enough and live.status.is_enough else _finished(live)
+    if json:
+        _tell(status, json)
+    else:
         tell(status.document(), False, provenance([robot_input(robot)]))
     if not status.is_enough:
         end_failed(status.verdict)
+
+
+def _finished(live: Live) -> LiveStatus:
+    """The last answer, after a whole fit; Ctrl-C once more goes without it."""
+    try:
+        return live.finish()
+    except KeyboardInterrupt:
+        return live.status
 
 
 def _tell_bad(table: GrowingTable) -> int:

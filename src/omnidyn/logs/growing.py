@@ -18,7 +18,9 @@ import numpy as np
 
 from omnidyn.errors import InputError
 from omnidyn.files import format_of, open_regular
+from omnidyn.logs.clock.block_angles import BlockAngle
 from omnidyn.logs.clock.clock import Clock
+from omnidyn.logs.clock.counters import COUNTERS
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.read_log import LogOptions, log_from_table, map_columns
 from omnidyn.logs.readers.read_table import read_table
@@ -73,14 +75,19 @@ def growth_of(path: str) -> Iterator[bytes | None]:
 
 class GrowingTable:
     """Lines in, Runs out. source: its name. columns: which column is what, once that is known; bad_rows: lines that
-    held no row that can be used."""
+    held no row that can be used. resets: how often an encoder was set to another value."""
 
     def __init__(self, source: str, robot: Robot | None = None, options: LogOptions | None = None) -> None:
         self.source, self.robot, self.options = source, robot, replace(options or LogOptions(), skip_bad_rows=True)
         self.columns: ColumnMap | None = None
         self.bad_rows = 0
         self._rest, self._lines, self._head = "", list[str](), list[str]()
-        self._clock, self._heading = Clock(), np.nan
+        self._clock, self._heading, self._wheels = Clock(), np.nan, list[BlockAngle]()
+
+    @property
+    def resets(self) -> int:
+        """How often an encoder was set to another value: of the wheel that was most often."""
+        return max((wheel.resets for wheel in self._wheels), default=0)
 
     def feed(self, text: str) -> list[Run]:
         """Take more text; the rows that are whole by now. Raises InputError for what is no table, or is doubtful."""
@@ -104,6 +111,7 @@ class GrowingTable:
     def begin_anew(self) -> None:
         """The file was written anew: its clock, and perhaps its columns."""
         self.columns, self._head, self._rest, self._lines, self._clock = None, [], "", [], Clock()
+        self._wheels = []
 
     def _read(self) -> list[Run]:
         lines = self._without_head(self._lines)
@@ -150,7 +158,11 @@ class GrowingTable:
         return replace(table, source=self.source)
 
     def _continued(self, run: Run) -> Run:
-        """The run, its heading without a jump of whole turns from the rows before."""
+        """The run, its angles of wheels without jumps from the rows before, its heading without one of whole turns."""
+        if run.wheel_angle is not None:
+            self._wheels = self._wheels or [BlockAngle(self._periods(i)) for i in range(run.wheel_angle.shape[1])]
+            wheels = zip(self._wheels, run.wheel_angle.T, strict=True)
+            run = run.replace(wheel_angle=np.column_stack([wheel.going_on(run.t, angle) for wheel, angle in wheels]))
         if run.pose is None or not np.isfinite(run.pose[:, 2]).any():
             return run
         heading = run.pose[:, 2]
@@ -159,3 +171,12 @@ class GrowingTable:
         pose = run.pose + np.array([0.0, 0.0, TURN * turns])
         self._heading = float(pose[np.isfinite(heading), 2][-1])
         return run.replace(pose=pose)
+
+    def _periods(self, wheel: int) -> tuple[float, ...]:
+        """What the angle of a wheel may start over after [rad]: a turn, and what its counter holds."""
+        column = None if self.columns is None else self.columns.columns.get(f"a{wheel + 1}")
+        if column is None:
+            return ()
+        divisor = 1.0 if self.robot is None else column.divisor(self.robot, wheel)
+        counts = [count * abs(column.factor) for count in COUNTERS] if "/" in column.unit else []
+        return tuple(period / divisor for period in (TURN, *counts))

@@ -27,6 +27,13 @@ def _not_predicted(statement: Statement) -> str:
     return "not yet: the numbers are known, and wait for a stretch of driving that they predict"
 
 
+def _not_explained(statement: Statement) -> str:
+    """A stretch in which something happened that the model does not have."""
+    numbers = statement.numbers
+    stretch = f"{numbers['start']:.0f} s to {numbers['end']:.0f} s"
+    return f"not yet: the numbers are known, but do not explain {all_of(numbers['missed'])} from {stretch}"
+
+
 def _changed(statement: Statement) -> str:
     """What changed since a fit, and what that looks like."""
     pairs = zip(statement.numbers["keys"], statement.numbers["shares"], strict=True)
@@ -44,6 +51,9 @@ SENTENCES = {
     "live_waiting": Sentence("no numbers yet after {seconds:.0f} s and {rows} rows: {why}"),
     "live_not_yet": Sentence(_not_yet),
     "live_not_predicted": Sentence(_not_predicted, "drive on; where it stays so, fit the log with identify"),
+    "live_not_explained": Sentence(
+        _not_explained, "look what happened then, such as a lifted wheel; begin a new log without it"
+    ),
     "live_not_this_model": Sentence(
         "not yet: the numbers are known, but the model leaves something out",
         "fit the log with identify: it looks for what",

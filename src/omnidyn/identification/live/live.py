@@ -95,9 +95,11 @@ class Live:
         self._fitted_rows, self._fitted_at = 0, 0.0
         self._next_try, self._gap, self._waiting = FIRST, 0.0, f"the first fit takes {FIRST:g} s of rows"
         self._was_reached, self._enough_at, self._held_out = False, None, None
+        self._missed, self._unexplained = list[PredictedStretch](), None
         self._model: LiveModel | None
         self._enough_at: float | None
         self._held_out: PredictedStretch | None
+        self._unexplained: PredictedStretch | None
         self._status = LiveStatus(robot.name, waiting=self._waiting)
 
     @property
@@ -151,6 +153,17 @@ class Live:
         if self._model is None:
             self._status = self._answer()
 
+    def finish(self) -> LiveStatus:
+        """The answer when the drive has ended: all rows that are kept fitted anew.
+
+        Where errors remember, the likelihood has several optima some tenths of a standard error apart; this is the one
+        at which `identify` ends too, as long as the log is no longer than a whole fit here.
+        """
+        if self._rows.last - self._start >= FIRST and self._fitted_at < self._rows.last:
+            self._fit(self._rows.last)
+        self._status = self._answer() if self._rows.count else self._status
+        return self._status
+
     def _update(self, now: float) -> None:
         if self._model is None:
             if now - self._start >= self._next_try:
@@ -162,6 +175,7 @@ class Live:
         if now - model.start < STRETCH:
             return
         self._held_out = model.judge(now)
+        self._missed += [self._held_out] if self._held_out.missed else []
         seems_enough = self._was_reached and self._held_out.predicted and self._is_reached()
         model.close(now)
         age, is_small = now - self._start, self._rows.count <= FIT_ROWS
@@ -175,7 +189,9 @@ class Live:
         if self._held_out.missed or self._model.misfit:
             self._enough_at = None
         elif self._enough_at is None and seems_enough and self._was_reached:
-            self._enough_at = age
+            stretches = (self._model.unexplained(self._rows, missed.start, missed.end) for missed in self._missed)
+            self._unexplained = next(filter(None, stretches), None)
+            self._enough_at = age if self._unexplained is None else None
         if self._rows.count > MOST_ROWS:
             self._model.freeze()
             self._rows.forget(self._model.start - STRETCH)
@@ -230,6 +246,7 @@ class Live:
             numbers=self._numbers(),
             held_out=self._held_out,
             enough_at=self._enough_at,
+            unexplained=self._unexplained,
             misfit=self._model.misfit if self._fitted_at - self._start >= SURE else (),
             changes=changed,
             waiting="",

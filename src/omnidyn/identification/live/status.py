@@ -56,6 +56,7 @@ class LiveStatus(Displayable):
     numbers: Mapping[str, LiveNumber] = field(default_factory=dict)
     held_out: PredictedStretch | None = None
     enough_at: float | None = None
+    unexplained: PredictedStretch | None = None
     misfit: tuple[str, ...] = ()
     restarts: int = 0
     gap: float = 0.0
@@ -95,6 +96,10 @@ class LiveStatus(Displayable):
             return Statement("live_not_yet", NOTE, self.robot, numbers)
         if self.misfit:
             return Statement("live_not_this_model", WARNING, self.robot, numbers)
+        odd = self.unexplained
+        if odd is not None and not (self.held_out and self.held_out.missed):
+            numbers |= {"missed": odd.missed, "start": odd.start, "end": odd.end}
+            return Statement("live_not_explained", WARNING, self.robot, numbers)
         missed = () if self.held_out is None else self.held_out.missed
         return Statement("live_not_predicted", WARNING if missed else NOTE, self.robot, numbers | {"missed": missed})
 
@@ -150,6 +155,9 @@ class LiveStatus(Displayable):
                 "held_out": None
                 if held is None
                 else {"start_s": held.start, "end_s": held.end, "predicted": held.predicted, "ratio": dict(held.ratio)},
+                "unexplained": None
+                if self.unexplained is None
+                else {"start_s": self.unexplained.start, "end_s": self.unexplained.end},
                 "misfit": list(self.misfit),
                 "restarts": self.restarts,
                 "changes": [change.to_dict() for change in self.changes],

@@ -6,6 +6,7 @@ import pytest
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
+from omnidyn.identification.output_error.trust.uncertainty import _at_least
 from omnidyn.model.keys import BOX, Key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -216,3 +217,11 @@ def test_errors_that_remember_ask_for_no_nuisance(axebot, clean):
     """The scatter of white noise is too small a measure: five of its standard errors are one or two of theirs."""
     fit = identify(coloured(clean, 0), axebot, OutputError(start="rest")).estimate
     assert not any(remedy.confident for remedy in fit.lack_of_fit.remedies)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_a_least_covariance_of_one_direction_alone_is_no_crash(angle):
+    """Along it the larger variance, across it what is wide: max(2, 5), and max(3, 0)."""
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    wide, least, answer = (turn @ np.diag(variances) @ turn.T for variances in ((2.0, 3.0), (5.0, 0.0), (5.0, 3.0)))
+    assert _at_least(wide, least, 1.0) == pytest.approx(answer, abs=1e-6)

@@ -71,8 +71,9 @@ class WhitenedEngine(FitEngine[Problem]):
                 continue
             rows, steps = known_rows(piece, residual[c], slopes[c])
             if rows.size < residual.shape[1]:
-                other_rows = np.setdiff1d(np.arange(residual.shape[1]), rows)
-                residual[c, other_rows], slopes[c, other_rows] = np.nan, 0.0
+                is_unknown = np.ones(residual.shape[1], bool)
+                is_unknown[rows] = False
+                residual[c, is_unknown], slopes[c, is_unknown] = np.nan, 0.0
             series = np.column_stack([residual[c, rows], slopes[c, rows]])
             new = self.models[column].new(series, steps, moves[c, rows])
             residual[c, rows], slopes[c, rows] = new[:, 0], new[:, 1:]

@@ -341,7 +341,7 @@ def _degrees(new_solution: Solution, uncertainty: Trust, models: Mapping[Column,
         scatter += model.scatter(
             memory_slopes[column] / new_solution.state.variance[solver.problem.columns.index(column)]
         )
-    degrees = 2.0 * variance**2 / np.maximum(scatter, 1e-300)
+    degrees = 2.0 * variance**2 / np.maximum(scatter, np.maximum(1e-12 * variance**2, 1e-300))
     return float(np.clip(degrees.min(), 3.0, max(uncertainty.degrees, 3)))
 
 

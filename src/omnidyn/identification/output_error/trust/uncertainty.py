@@ -324,7 +324,15 @@ def _least(solver: Solver, solution: Solution, root: FloatArray) -> FloatArray:
         return np.eye(root.shape[1])
     information, scatter = (root.T @ scatter_matrix @ root for scatter_matrix in rounding_scatter(solver, solution))
     inverse = np.linalg.inv(information)
-    return inverse @ scatter @ inverse
+    variances, axes = _principal(inverse @ scatter @ inverse)
+    return axes * variances @ axes.T
+
+
+def _principal(covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(variances (K,), axes (K, K)) of a covariance; a second of counts scatters one way alone, and rounding makes the
+    others no less than 0."""
+    variances, axes = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    return np.maximum(variances, PRECISION * variances.max(initial=0.0)), axes
 
 
 def _at_least(wide_covariance: FloatArray, least_covariance: FloatArray, scatter_limit: float) -> FloatArray:
@@ -338,8 +346,8 @@ def _at_least(wide_covariance: FloatArray, least_covariance: FloatArray, scatter
     show by chance, which is (1 + sqrt(K/n))^2 (Marchenko, Pastur, Math. USSR Sb. 1 (1967)); else 1. Shapes (K, K), see
     `_root_of_inverse`.
     """
-    lower = np.linalg.cholesky(0.5 * (least_covariance + least_covariance.T))
-    inverse = np.linalg.inv(lower)
+    variances, axes = _principal(least_covariance)
+    lower, inverse = axes * np.sqrt(variances), (axes / np.sqrt(variances)).T
     ratio, ways = np.linalg.eigh(inverse @ wide_covariance @ inverse.T)
     correction = lower @ ways * np.sqrt(np.where(ratio > scatter_limit, ratio - 1.0, 0.0).clip(0.0))
     return least_covariance + correction @ correction.T
