@@ -128,12 +128,12 @@ class LiveModel:
         """A stretch that is closed, if the numbers as they are now leave more of it than noise: what happened in it is
         not in the model, and yet counts in the numbers. None where all is well, or its rows are gone."""
         kept, self._starts = (self._starts, self._has_signal), ()
-        told = self.told_by(rows, start, end)
+        sums = self.told_by(rows, start, end)
         self._starts, self._has_signal = kept
         ratio = {
-            f"{name}[{index}]": float(told.square[c] / told.number[c] / max(self.variance[c], 1e-300))
-            for c, (name, index) in enumerate(told.columns)
-            if told.number[c] > 0.0
+            f"{name}[{index}]": float(sums.square[c] / sums.number[c] / max(self.variance[c], 1e-300))
+            for c, (name, index) in enumerate(sums.columns)
+            if sums.number[c] > 0.0
         }
         stretch = PredictedStretch(start, end, ratio, dict.fromkeys(ratio, UNEXPLAINED), True)
         return stretch if stretch.missed else None
