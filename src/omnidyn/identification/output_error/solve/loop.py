@@ -312,7 +312,7 @@ def _grown(solver: Solver, point: Point) -> Point:
     """
     longest = max(p.last - p.first for p in solver.problem.pieces)
     for share in SHARES:
-        short = shortened(solver.problem, max(int(share * longest), SETTING_OFF))
+        short = shortened(solver.problem, max(int(share * longest), LEAST_ROWS))
         short_solution = Solver(short, solver.engine.on(short), solver.nu, solver.close).minimise(point, FEW_ITERATIONS)
         point = Point(short_solution.state.point.values, point.states)
     return point
