@@ -166,3 +166,13 @@ def test_without_a_memory_nothing_leans_on_one():
     ways = np.random.default_rng(7).normal(size=(50, 2))
     found = AutoRegression(np.zeros(0), 1.0, 50).leaning(ways, ways, np.ones(50, int))
     np.testing.assert_allclose(found, (ways**2).sum(axis=0)[None])
+
+
+def test_what_stays_all_but_the_same_has_a_memory_whose_covariance_can_be_solved():
+    """A constant 3e7 times the noise beside it, as where a fit has not seen where an angle starts: rounding made its
+    first partial correlation 1 - 6e-16 and the covariance singular."""
+    noise = np.random.default_rng(4).normal(size=(4000, 1))
+    model = autoregression([np.column_stack([noise, np.full(4000, 3e7)])])
+    assert model.order and 1.0 - model.partial[0] == pytest.approx(2.5e-9)
+    assert np.isfinite(model.scatter(np.ones((1 + model.order, 2)))).all() and model.degrees < 10.0
+    assert np.linalg.cond(model.covariance) < 1e14

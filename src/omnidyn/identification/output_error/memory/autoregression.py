@@ -30,6 +30,7 @@ ORDERS = 10.0  # times log10 of the number of rows: the highest order that is tr
 SHARE = 0.1  # of the rows that may be coefficients
 PATIENCE = 15  # orders without a better one, after which none is looked for
 MEMORY_ROWS = 20_000  # rows after which a memory is as good as endless
+CLOSEST = 1.0 - 1.0 / MEMORY_ROWS**2  # correlation of neighbours; a swing of so many rows has less
 MIXED_ORDER = 2  # order from which on white noise beside errors that remember is asked for
 BLOCK, POWER_ERRORS = 50, 1.5  # rows; standard errors above the power of white noise from which on the same is asked
 MANY_NUMBERS = 300_000  # numbers of series, from which it pays to look for columns that say nothing new
@@ -325,6 +326,7 @@ def _burg(forward_errors, backward_errors, ends, limit, patience):
         k = 2.0 * error_power.sum() / total if total > 0.0 else 1.0
         if abs(k) >= 1.0:
             break
+        k = min(max(k, -CLOSEST), CLOSEST)  # what remembers more is rounding, and its covariance cannot be solved
         partial[order] = k
         variance *= 1.0 - k * k
         cost += pairs * math.log1p(-k * k) + math.log(rows)  # rows that reach so far back
