@@ -269,6 +269,14 @@ def test_rows_keep_time_and_join_channels():
     assert rows.total == 4
 
 
+def test_a_row_that_is_sent_twice_does_not_begin_time_anew(log):
+    live, once = omnidyn.Live(WRONG), part(log, 0, 120)
+    for first, stop in ((0, 50), (49, 50), (49, 100), (99, 120)):
+        live.add(part(log, first, stop))
+    assert (live.status.restarts, live.status.rows, live.status.gap) == (0, 120, 0.0)
+    np.testing.assert_array_equal(live._rows.between(-np.inf, np.inf).twist, once.twist)
+
+
 def test_what_cannot_be_used_is_refused():
     with pytest.raises(omnidyn.OmnidynError, match="another number of wheels; got 4; expected 3, as axebot has; give"):
         omnidyn.Live(ROBOT).add(omnidyn.Run(t=[0.0, 0.1], voltage=np.zeros((2, 4)), twist=np.zeros((2, 3))))

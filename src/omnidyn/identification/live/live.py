@@ -132,8 +132,10 @@ class Live:
                 remedy="give the robot that the log is of",
                 where=run.source,
             )
-        if not len(run):
+        repeated = self._rows.repeated(run)
+        if len(run) == repeated:
             return
+        run = part(run, repeated, len(run)) if repeated else run
         before, shifted = self._rows.last, self._rows.on_clock(run)
         gaps = np.diff(shifted.t, prepend=before if math.isfinite(before) else shifted.t[0])
         self._gap = max(self._gap, float(gaps.max()) if gaps.max() > LONGEST_GAP else 0.0)

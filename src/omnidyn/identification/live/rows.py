@@ -31,6 +31,10 @@ class Rows:
         """How many are kept."""
         return sum(map(len, self.runs))
 
+    def repeated(self, run: Run) -> int:
+        """How many rows at the start of a run are the last one once more: 0 or 1, for time grows within a run."""
+        return int(len(run) > 0 and run.t[0] + self.shift == self.last)
+
     def on_clock(self, run: Run) -> Run:
         """A run with the times under which it is kept."""
         if run.t[0] + self.shift <= self.last:
