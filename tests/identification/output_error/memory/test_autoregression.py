@@ -173,6 +173,8 @@ def test_what_stays_all_but_the_same_has_a_memory_whose_covariance_can_be_solved
     first partial correlation 1 - 6e-16 and the covariance singular."""
     noise = np.random.default_rng(4).normal(size=(4000, 1))
     model = autoregression([np.column_stack([noise, np.full(4000, 3e7)])])
-    assert model.order and 1.0 - model.partial[0] == pytest.approx(2.5e-9)
-    assert np.isfinite(model.scatter(np.ones((1 + model.order, 2)))).all() and model.degrees < 10.0
+    assert model.order
+    assert 1.0 - model.partial[0] == pytest.approx(2.5e-9)
+    assert np.isfinite(model.scatter(np.ones((1 + model.order, 2)))).all()
+    assert model.degrees < 10.0
     assert np.linalg.cond(model.covariance) < 1e14
