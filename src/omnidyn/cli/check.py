@@ -85,7 +85,7 @@ def check(
         loaded = omnidyn.load_robot(robot) if robot else None
         checked_logs = [_checked(path, loaded, options, maps, progress, bool(picture)) for path in files]
         table, no_table = None, None
-        if wheel_table and loaded is not None:
+        if wheel_table and loaded is not None and not any(log.error for log in checked_logs):
             try:
                 runs = [one.to_run() for _, one in log_options.load_logs(files, loaded, options)]
                 table = omnidyn.wheel_table(runs, loaded)
