@@ -62,6 +62,20 @@ def test_a_program_of_speeds_that_no_motor_reaches_is_refused():
         program(1e6 * ROWS)
 
 
+@pytest.mark.parametrize("table", ["wheels.csv", None, 4])
+def test_what_is_no_table_is_refused(table):
+    with pytest.raises(InputError, match="expected TabledConnection"):
+        TabledConnection(Worn(), table)
+
+
+@pytest.mark.parametrize("name", ["held", "progress", "follow"])
+def test_what_cannot_be_called_is_refused_before_the_line_is_open(name):
+    worn = Worn()
+    with pytest.raises(InputError, match=f"{name}: not a function; got 3; expected"):
+        omnidyn.drive(program(), worn, **{name: 3})
+    assert worn.opened == 0
+
+
 def test_a_copy_is_a_connection_too():
     assert copy.copy(TabledConnection(Worn(), table_of())).sent == []
 

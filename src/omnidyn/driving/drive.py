@@ -64,6 +64,11 @@ def drive(
     True
     """
     check_order("drive(program, connection)", (program, DriveProgram), (connection, object))
+    for name, told in (("held", held), ("progress", progress), ("follow", follow)):
+        if told is not None and not callable(told):
+            raise InputError(
+                "not a function", got=told, expected=f"a function that is called, or no `{name}`", where=name
+            )
     limits = limits or Limits()
     most = 0.5 * limits.dead_man
     if program.dt > most:  # the motors would be off before the next row

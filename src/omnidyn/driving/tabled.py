@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from omnidyn.arguments import check_order
 from omnidyn.driving.connection import Command, Measured, RobotConnection
 from omnidyn.driving.program import DriveProgram
 from omnidyn.errors import InputError
@@ -44,6 +45,7 @@ class TabledConnection:
     """
 
     def __init__(self, connection: RobotConnection, table: WheelTable) -> None:
+        check_order("TabledConnection(connection, table)", (connection, object), (table, WheelTable))
         self._connection, self._table = connection, table
 
     def __getattr__(self, name: str) -> Any:

@@ -181,6 +181,15 @@ def wheel_table(logs: Run | Sequence[Run], robot: Robot) -> WheelTable:
                 expected="set speeds of the wheels, such as w1_cmd_rad_s, or of the body",
                 where=run.source or "logs",
             )
+        widths = [np.shape(getattr(run, name)) for name in (COMMANDED[0], MEASURED[0], "wheel_angle")]
+        if counts := [shape[1] for shape in widths if shape and shape[1] != robot.wheels.count]:
+            raise InputError(
+                "the log has another number of wheels",
+                got=f"{counts[0]} wheels",
+                expected=f"{robot.wheels.count}, as {robot.name} has",
+                remedy="give the robot of this log",
+                where=run.source or "logs",
+            )
         for plateau in find_plateaus(run):
             pair = [_speeds(plateau.mean, names, robot) for names in (COMMANDED, MEASURED)]
             if pair[0] is not None and pair[1] is not None:
@@ -223,7 +232,7 @@ def _line(wheel: int, direction: int, asked: FloatArray, turned: FloatArray) -> 
     if gain <= 0.0 or offset > 0.0:  # no dead band: the line goes through 0
         gain, offset = float(x[turns] @ y[turns] / (x[turns] @ x[turns])), 0.0
     missed = float(np.sqrt(np.mean((y[turns] - gain * x[turns] - offset) ** 2)))
-    return WheelLine(wheel, direction, gain, max(-offset / gain, 0.0), float(x.max()), missed)
+    return WheelLine(wheel, direction, gain, max(0.0, -offset / gain), float(x.max()), missed)
 
 
 def read_wheel_table(path: str | os.PathLike[str]) -> WheelTable:
