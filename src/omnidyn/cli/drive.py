@@ -107,6 +107,7 @@ def drive(
         raise InputError("nowhere to record the drive", got="no file", expected="-o LOG", where="-o")
     truth = omnidyn.load_robot(plant) if plant else program.robot
     driven = _drive(program, plan, to, truth, seed, (dead_man, supply), hold, table)
+    out = out if driven.run is not None else ""
     if out and driven.run is not None:
         omnidyn.write_run(driven.run, out, force=force)
     if to == STDOUT:
@@ -114,9 +115,10 @@ def drive(
     else:
         tell(driven.document(), json, record, output=out or None)
     if not json:
-        say(
-            f"omnidyn: wrote {out}" if out and driven.run is not None else "omnidyn: nothing written; -o LOG records it"
+        nothing = (
+            "omnidyn: nothing written; -o LOG records it" if driven.run is not None else "omnidyn: nothing written"
         )
+        say(f"omnidyn: wrote {out}" if out else nothing)
     if not driven.is_complete:
         end_failed(driven.verdict)
 
