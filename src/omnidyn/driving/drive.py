@@ -64,10 +64,10 @@ def drive(
     True
     """
     check_order("drive(program, connection)", (program, DriveProgram), (connection, object))
-    for name, told in (("held", held), ("progress", progress), ("follow", follow)):
-        if told is not None and not callable(told):
+    for name, listener in (("held", held), ("progress", progress), ("follow", follow)):
+        if listener is not None and not callable(listener):
             raise InputError(
-                "not a function", got=told, expected=f"a function that is called, or no `{name}`", where=name
+                "not a function", got=listener, expected=f"a function that is called, or no `{name}`", where=name
             )
     limits = limits or Limits()
     most = 0.5 * limits.dead_man

@@ -60,7 +60,9 @@ class WheelTable(Displayable):
 
     def __post_init__(self) -> None:
         wheels = range(1, len(self.lines) // 2 + 1)
-        if not wheels or [line[:2] for line in self.lines] != [(wheel, way) for wheel in wheels for way in (1, -1)]:
+        if not wheels or [line[:2] for line in self.lines] != [
+            (wheel, direction) for wheel in wheels for direction in (1, -1)
+        ]:
             raise InputError(
                 "no table of wheels",
                 got=f"{len(self.lines)} rows",
