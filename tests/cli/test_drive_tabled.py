@@ -30,6 +30,8 @@ def test_the_commands_of_the_command_line_are_those_of_the_table(planned, here):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )
+    assert process.stdin is not None
+    assert process.stdout is not None
     sent, rest = [], b""
     try:
         while select.select([process.stdout], [], [], 120.0)[0] and (data := os.read(process.stdout.fileno(), 1 << 16)):

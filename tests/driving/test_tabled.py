@@ -18,13 +18,16 @@ def test_what_is_sent_makes_the_wheels_turn_as_planned():
     worn, plain = Worn(), SimulatedRobot(LEKIWI, rate=1.0 / DT)
     record = omnidyn.drive(program(), TabledConnection(worn, table_of()))
     assert record.is_complete, str(record.verdict)
+    assert record.run is not None
     sent = np.array(worn.sent)
     rows = sent[np.flatnonzero(sent.any(axis=1))[0] - 12 :][: len(ROWS)]
     np.testing.assert_allclose(rows, corrected(ROWS), atol=1e-12)
     np.testing.assert_allclose(np.asarray(record.run.wheel_speed_command)[: len(ROWS) - 1], ROWS[:-1], atol=1e-12)
     ideal = omnidyn.drive(program(), plain).run  # noise of the same seed
-    np.testing.assert_allclose(record.run.wheel_speed, ideal.wheel_speed, atol=1e-9)
+    assert ideal is not None
+    np.testing.assert_allclose(np.asarray(record.run.wheel_speed), np.asarray(ideal.wheel_speed), atol=1e-9)
     without = omnidyn.drive(program(), Worn()).run
+    assert without is not None
     assert np.nanmax(np.abs(np.asarray(without.wheel_speed) - ideal.wheel_speed)) > 0.1
 
 
@@ -72,7 +75,7 @@ def test_what_is_no_table_is_refused(table):
 def test_what_cannot_be_called_is_refused_before_the_line_is_open(name):
     worn = Worn()
     with pytest.raises(InputError, match=f"{name}: not a function; got 3; expected"):
-        omnidyn.drive(program(), worn, **{name: 3})
+        omnidyn.drive(program(), worn, **{name: 3})  # type: ignore[arg-type]
     assert worn.opened == 0
 
 
