@@ -25,7 +25,7 @@ def planned(here):
 def test_the_commands_of_the_command_line_are_those_of_the_table(planned, here):
     """By `--to -`: a robot at the other end that answers each command at once."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "omnidyn", *planned, "--to", "-", "-o", "log.csv"],
+        [sys.executable, "-m", "omnidyn", *planned, "--to", "-", "-o", "log.csv", "--dead-man", "10"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
