@@ -1,5 +1,6 @@
 """omnidyn drive: a simulated robot, a stop, the rest, files, and what it does not take."""
 
+import importlib
 import json
 
 import numpy as np
@@ -92,6 +93,18 @@ def test_what_it_does_not_take(call, here, commands, arguments, words):
     code, _, err = call("drive", *arguments)
     assert code == 3
     assert words in err
+
+
+@pytest.mark.parametrize("json_", [False, True])
+def test_a_drive_without_a_row_names_no_log(call, here, commands, monkeypatch, json_):
+    monkeypatch.setattr(importlib.import_module("omnidyn.driving.drive"), "ANSWERS_WITHIN", 0.1)
+    options = ["--robot", "axebot", "--to", "udp:127.0.0.1:9", "-o", "log.csv", *(["--json"] if json_ else [])]
+    code, out, err = call("drive", commands, *options)
+    assert (code, (here / "log.csv").exists()) == (4, False)
+    assert "does not answer" in err
+    assert "-o LOG" not in err
+    if json_:
+        assert json.loads(out)["output"] is None
 
 
 def test_a_key_that_nobody_holds_is_waited_for_no_longer_than_a_minute(monkeypatch):

@@ -87,6 +87,26 @@ def test_logs_that_do_not_tell_are_refused(run, words):
         omnidyn.wheel_table(run(), LEKIWI)
 
 
+@pytest.mark.parametrize("channel", ["wheel_speed", "wheel_speed_command", "wheel_angle"])
+@pytest.mark.parametrize("levels", [[1.0, 2.0], [0.6, 1.5, 2.5]])
+def test_the_log_of_another_robot_is_refused(channel, levels):
+    """4 wheels in 12 stretches are as many numbers as 3 in 16."""
+    run = driven(levels).replace(wheel_angle=np.zeros_like(driven(levels).wheel_speed))
+    four = run.replace(**{channel: np.tile(np.asarray(getattr(run, channel))[:, :1], 4)})
+    with pytest.raises(omnidyn.OmnidynError, match="another number of wheels; got 4 wheels; expected 3, as lekiwi has"):
+        omnidyn.wheel_table(four, LEKIWI)
+
+
+def test_wheels_of_no_dead_band_have_none():
+    asked = np.repeat([[0.0], [1.0], [2.0], [-1.0], [-2.0]], 40, axis=0) * [1.0, 1.0, 1.0]
+    angle = np.cumsum(0.8 * 0.05 * asked, axis=0)
+    table = omnidyn.wheel_table(
+        omnidyn.Run(t=0.05 * np.arange(200), wheel_speed_command=asked, wheel_angle=angle), LEKIWI
+    )
+    assert "-0" not in str(table)
+    assert {round(line.gain, 3) for line in table.lines} == {0.8}
+
+
 def test_files_that_are_no_table_are_refused(tmp_path):
     path = tmp_path / "wheels.csv"
     path.write_text("wheel,direction,gain,dead_band_rad_s,most_rad_s,missed_rad_s\n1,1,1,0,3,0\n1,1,1,0,3,0\n")

@@ -84,15 +84,20 @@ def check(
     with shown_progress("reading") as progress:
         loaded = omnidyn.load_robot(robot) if robot else None
         checked_logs = [_checked(path, loaded, options, maps, progress, bool(picture)) for path in files]
-        table = None
-        if wheel_table and loaded is not None:
-            runs = [one.to_run() for _, one in log_options.load_logs(files, loaded, options)]
-            table = omnidyn.wheel_table(runs, loaded)
-            table.write(wheel_table, force)
+        table, no_table = None, None
+        if wheel_table and loaded is not None and not any(log.error for log in checked_logs):
+            try:
+                runs = [one.to_run() for _, one in log_options.load_logs(files, loaded, options)]
+                table = omnidyn.wheel_table(runs, loaded)
+                table.write(wheel_table, force)
+            except OmnidynError as error:  # what was checked is shown first
+                no_table = error
     _compare_data(checked_logs)
     _tell(checked_logs, json, full, robot, table)
     if picture:
         _draw(checked_logs[0], picture, force)
+    if no_table is not None:
+        raise no_table
     if any(log.error is not None for log in checked_logs):
         raise typer.Exit(BAD_INPUT)
     if any(log.verdict is not None and (log.verdict.has_errors or log.verdict.useless) for log in checked_logs):

@@ -19,6 +19,7 @@ from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import end_failed, tell
 from omnidyn.errors import InputError
 from omnidyn.files import check_output
+from omnidyn.statement import WARNING
 
 if TYPE_CHECKING:
     from omnidyn.driving.connection import RobotConnection
@@ -77,7 +78,7 @@ def drive(
     if out and to not in KINDS:
         check_output(out, force)
     keep_inputs([], [robot, plant], [plan, wheel_table, *resume], out)
-    table = _table(wheel_table, to == SIM or to in KINDS) if wheel_table else None
+    table = _table(wheel_table, to if to == SIM or to in KINDS else "") if wheel_table else None
     program = read_program(plan, omnidyn.load_robot(robot) if robot else None, _sizes(area) if area else None)
     inputs = [input_file("plan", plan), *([robot_input(robot)] if robot else [])]
     if resume:
@@ -85,6 +86,13 @@ def drive(
 
         program = rest_of(program, [omnidyn.read_log(path, robot=program.robot) for path in resume])
         inputs += [input_file("log", path) for path in resume]
+    if table is not None:
+        from omnidyn.driving.tabled import check_table
+
+        check_table(program, table)
+        inputs.append(input_file("wheel_table", wheel_table))
+        if table.verdict.severity == WARNING:
+            say(f"omnidyn: warning: {table.verdict}")
     record = provenance(inputs)
     if dry_run:
         tell(program.document(), json, record)
@@ -99,6 +107,7 @@ def drive(
         raise InputError("nowhere to record the drive", got="no file", expected="-o LOG", where="-o")
     truth = omnidyn.load_robot(plant) if plant else program.robot
     driven = _drive(program, plan, to, truth, seed, (dead_man, supply), hold, table)
+    out = out if driven.run is not None else ""
     if out and driven.run is not None:
         omnidyn.write_run(driven.run, out, force=force)
     if to == STDOUT:
@@ -106,19 +115,20 @@ def drive(
     else:
         tell(driven.document(), json, record, output=out or None)
     if not json:
-        say(
-            f"omnidyn: wrote {out}" if out and driven.run is not None else "omnidyn: nothing written; -o LOG records it"
+        nothing = (
+            "omnidyn: nothing written; -o LOG records it" if driven.run is not None else "omnidyn: nothing written"
         )
+        say(f"omnidyn: wrote {out}" if out else nothing)
     if not driven.is_complete:
         end_failed(driven.verdict)
 
 
-def _table(path: str, is_unused: bool) -> WheelTable:
-    """The table of wheels in a file. Raises InputError where nothing is sent by it."""
-    if is_unused:
+def _table(path: str, unused: str) -> WheelTable:
+    """The table of wheels in a file. unused: a place to which nothing is sent by it. Raises InputError for that."""
+    if unused:
         raise InputError(
             "a table of wheels is for a robot that is driven from here",
-            got="another --to",
+            got=f"--to {unused}",
             expected="serial:PORT, udp:HOST:PORT or -",
             where="--wheel-table",
         )

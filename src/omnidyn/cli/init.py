@@ -20,6 +20,7 @@ from omnidyn.files import check_output, write_atomic
 from omnidyn.model.presets import preset_names
 
 MAX_NAME = 60
+LEAST_VOLTS, MOST_VOLTS = 0.5, 1000.0  # [V]: beyond lies another unit
 
 
 @reads_logs("latency", "save_map", "sort", "skip_bad_rows", "current_unsigned")
@@ -131,14 +132,23 @@ def _refuse_numbers(values: dict[str, Any]) -> None:
             where="--azimuth",
         )
     for key, otherwise in (("voltage_limit", "for a guess"), ("supply", "for a drive that takes volts")):
-        if (volts := values[key]) is not None and not 0.0 < volts < float("inf"):
+        if (volts := values[key]) is not None and not LEAST_VOLTS <= volts <= MOST_VOLTS:
             raise InputError(
                 "no motor turns at this voltage",
                 got=f"{volts:g} V",
-                expected="more than 0 V, such as 12",
+                expected=f"volts, {LEAST_VOLTS:g} to {MOST_VOLTS:g}, such as 12",
                 remedy=f"leave it out {otherwise}",
                 where=f"--{key.replace('_', '-')}",
             )
+    supply, limit = values["supply"], values["voltage_limit"]
+    if supply is not None and limit is not None and limit > supply:
+        raise InputError(
+            "no driver gives more than its supply",
+            got=f"{limit:g} V of a supply of {supply:g} V",
+            expected=f"at most {supply:g} V",
+            remedy="leave it out: then it is the supply",
+            where="--voltage-limit",
+        )
     gear = values["gear_ratio"]
     if gear is not None and not 0.0 < gear < float("inf"):
         raise InputError(

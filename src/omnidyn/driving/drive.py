@@ -15,6 +15,7 @@ from omnidyn.driving.guard import DriveGuard, Limits
 from omnidyn.driving.program import DriveProgram
 from omnidyn.driving.record import DriveRecord
 from omnidyn.driving.recording import DriveRecording
+from omnidyn.driving.tabled import TabledConnection
 from omnidyn.errors import InputError
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run
@@ -50,7 +51,8 @@ def drive(
         progress: Hears what is done.
         follow: Hears where it is with each row, and at the end; it must return at once.
 
-    Raises InputError for rows that are longer than half the dead-man time, for which a command acts.
+    Raises InputError for rows that are longer than half the dead-man time, for which a command acts, and for a
+    `TabledConnection` whose table is not for this program.
 
     >>> import omnidyn
     >>> robot = omnidyn.load_robot("axebot")
@@ -62,6 +64,11 @@ def drive(
     True
     """
     check_order("drive(program, connection)", (program, DriveProgram), (connection, object))
+    for name, listener in (("held", held), ("progress", progress), ("follow", follow)):
+        if listener is not None and not callable(listener):
+            raise InputError(
+                "not a function", got=listener, expected=f"a function that is called, or no `{name}`", where=name
+            )
     limits = limits or Limits()
     most = 0.5 * limits.dead_man
     if program.dt > most:  # the motors would be off before the next row
@@ -72,6 +79,8 @@ def drive(
             remedy="take shorter rows, or a longer `dead_man`",
             where="program",
         )
+    if isinstance(connection, TabledConnection):
+        connection.check(program)
     driver = _Driver(program, connection, limits, clock or _clock_of(connection), held or (lambda: True), progress)
     driver.follow = follow or (lambda moment: None)
     return driver.run()

@@ -19,7 +19,9 @@ from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Table
 from omnidyn.errors import InputError
 from omnidyn.model.drive import DUTY, SPEED
+from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import per_wheel
 from omnidyn.run import Run
 from omnidyn.shown import Displayable
 from omnidyn.simulation.commands import as_floats
@@ -31,6 +33,7 @@ UNITS = {"voltage": "V", "duty": "duty", "wheel_speed_command": "rad/s"}
 STILL = (0.005, np.radians(1.0))  # [m], [rad]: less is no way
 BACK = 0.2  # of its farthest way: a leg that comes back by more says so
 ROUNDING = 1e-9  # of a duty, of a limit
+MOST_SPEED = 3.0  # of the speed without load: a set point beyond it is no speed of that wheel
 LARGEST = 1000.0  # [m] of a side of a room
 TURN_ONLY = 0.1  # [m] a rad: less way beside a turn is not named
 
@@ -95,6 +98,8 @@ class DriveProgram(Displayable):
             raise InputError("a duty beyond the supply", got=largest, expected="-1 to 1", where="inputs")
         if self.channel == "voltage":
             self._check_volts(rows)
+        if self.channel == "wheel_speed_command":
+            self._check_speeds(rows)
 
     def _check_volts(self, rows: FloatArray) -> None:
         limit = np.broadcast_to(np.asarray(self.robot.motor.voltage_limit, dtype=float), rows.shape[1])
@@ -106,6 +111,21 @@ class DriveProgram(Displayable):
                 got=f"{np.abs(rows[:, wheel]).max():g} V at wheel {wheel + 1}",
                 expected=f"at most {limit[wheel]:g} V, motor.voltage_limit_V of {self.robot.name}",
                 remedy="take smaller volts, or correct the limit in the robot file",
+                where="inputs",
+            )
+
+    def _check_speeds(self, rows: FloatArray) -> None:
+        wheels = rows.shape[1]
+        volts = per_wheel(self.robot.motor.voltage_limit, wheels)
+        most = MOST_SPEED * no_load_speed(self.robot.motor, volts)
+        beyond = np.abs(rows).max(axis=0) / most
+        wheel = int(np.argmax(beyond))
+        if beyond[wheel] > 1.0 + ROUNDING:
+            raise InputError(
+                "speeds beyond what the motor reaches",
+                got=f"{np.abs(rows[:, wheel]).max():g} rad/s at wheel {wheel + 1}",
+                expected=f"at most {most[wheel]:.4g} rad/s, {MOST_SPEED:g} times its speed without load",
+                remedy="take smaller speeds, check their unit, or correct the motor in the robot file",
                 where="inputs",
             )
 

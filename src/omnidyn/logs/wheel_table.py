@@ -32,7 +32,7 @@ TURNS = 0.03  # of the largest speed: a wheel that turns less stands
 LEVELS = 2  # speeds of a direction that a line needs
 SAME_SPEED = 0.03  # of the largest: speeds that differ by less are one level
 STRAIGHT = 0.05  # of the largest speed: a line that misses more is no good table
-EXPECTED = "two rows for each wheel, direction 1 and -1"
+GAINS = (0.1, 10.0)  # with others a table is of other units, or of no wheel
 COMMANDED, MEASURED = ("wheel_speed_command", "twist_command"), ("wheel_speed", "twist")
 COLUMNS = ("wheel", "direction", "gain", "dead_band_rad_s", "most_rad_s", "missed_rad_s")
 
@@ -51,9 +51,47 @@ class WheelLine(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class WheelTable(Displayable):
-    """A line for each wheel and direction, forward first."""
+    """A line for each wheel and direction, forward first.
+
+    Raises InputError for lines that are missing, and for gains and dead bands that no wheel has.
+    """
 
     lines: tuple[WheelLine, ...]
+
+    def __post_init__(self) -> None:
+        wheels = range(1, len(self.lines) // 2 + 1)
+        if not wheels or [line[:2] for line in self.lines] != [
+            (wheel, direction) for wheel in wheels for direction in (1, -1)
+        ]:
+            raise InputError(
+                "no table of wheels",
+                got=f"{len(self.lines)} rows",
+                expected="two rows for each wheel, 1 and on, direction 1 and -1",
+                remedy="write it with omnidyn check --wheel-table",
+                where="lines",
+            )
+        for line in self.lines:
+            self._check_line(line)
+
+    def _check_line(self, line: WheelLine) -> None:
+        place = f"wheel {line.wheel}, direction {line.direction}"
+        least, most = GAINS
+        if not least <= line.gain <= most:
+            raise InputError(
+                "no wheel turns like this when it is asked to",
+                got=f"gain {line.gain:.4g} of {place}",
+                expected=f"a gain from {least:g} to {most:g}",
+                remedy="check the units and the wheels of asked and measured speeds, then write the table again",
+                where="lines",
+            )
+        if not 0.0 <= line.dead_band < line.most < np.inf or not 0.0 <= line.missed < np.inf:
+            raise InputError(
+                "no speeds of a wheel",
+                got=f"dead band {line.dead_band:g}, asked up to {line.most:g}, missed {line.missed:g} of {place}",
+                expected="rad/s, 0 or more, the dead band below the largest that was asked for",
+                remedy="write the table again with omnidyn check --wheel-table",
+                where="lines",
+            )
 
     @property
     def _grid(self) -> FloatArray:
@@ -145,6 +183,15 @@ def wheel_table(logs: Run | Sequence[Run], robot: Robot) -> WheelTable:
                 expected="set speeds of the wheels, such as w1_cmd_rad_s, or of the body",
                 where=run.source or "logs",
             )
+        widths = [np.shape(getattr(run, name)) for name in (COMMANDED[0], MEASURED[0], "wheel_angle")]
+        if counts := [shape[1] for shape in widths if shape and shape[1] != robot.wheels.count]:
+            raise InputError(
+                "the log has another number of wheels",
+                got=f"{counts[0]} wheels",
+                expected=f"{robot.wheels.count}, as {robot.name} has",
+                remedy="give the robot of this log",
+                where=run.source or "logs",
+            )
         for plateau in find_plateaus(run):
             pair = [_speeds(plateau.mean, names, robot) for names in (COMMANDED, MEASURED)]
             if pair[0] is not None and pair[1] is not None:
@@ -187,7 +234,7 @@ def _line(wheel: int, direction: int, asked: FloatArray, turned: FloatArray) -> 
     if gain <= 0.0 or offset > 0.0:  # no dead band: the line goes through 0
         gain, offset = float(x[turns] @ y[turns] / (x[turns] @ x[turns])), 0.0
     missed = float(np.sqrt(np.mean((y[turns] - gain * x[turns] - offset) ** 2)))
-    return WheelLine(wheel, direction, gain, max(-offset / gain, 0.0), float(x.max()), missed)
+    return WheelLine(wheel, direction, gain, max(0.0, -offset / gain), float(x.max()), missed)
 
 
 def read_wheel_table(path: str | os.PathLike[str]) -> WheelTable:
@@ -195,11 +242,8 @@ def read_wheel_table(path: str | os.PathLike[str]) -> WheelTable:
     table = read_table(path)
     table.check_names(COLUMNS)
     columns = [table.numbers(name) for name in COLUMNS]
-    wheels = len(table) // 2
-    expected = [(wheel, direction) for wheel in range(1, wheels + 1) for direction in (1, -1)]
-    if not wheels or [*zip(*(column.tolist() for column in columns[:2]), strict=True)] != expected:
-        raise InputError("no table of wheels", got=f"{len(table)} rows", expected=EXPECTED, where=os.fspath(path))
-    if not (columns[2] > 0.0).all() or not (columns[3] >= 0.0).all():
-        raise InputError("no table of wheels", got="a gain or a dead band", expected="gains above 0", where=str(path))
     rows = zip(*(column.tolist() for column in columns), strict=True)
-    return WheelTable(tuple(WheelLine(int(wheel), int(direction), *rest) for wheel, direction, *rest in rows))
+    try:
+        return WheelTable(tuple(WheelLine(int(wheel), int(direction), *rest) for wheel, direction, *rest in rows))
+    except InputError as error:
+        raise error.at(os.fspath(path)) from None
