@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.findings.check import check
+from omnidyn.logs.log import Log
 
 
 def copied(values, of=0, into=1):
@@ -43,6 +44,21 @@ def test_wheels_that_turn_alike_without_noise_are_a_note(log, with_channels):
     speed = np.round(5.0 * np.sin(0.01 * np.arange(len(log))), 1)[:, None] * [1.0, 1.0, -1.0]
     voltage = 0.4 * speed
     verdict = check(with_channels(wheel_speed=speed, voltage=voltage, current=None, twist=None, pose=None))
+    assert {finding.severity for finding in verdict.of("equal")} == {"note"}
+
+
+@pytest.mark.parametrize("noise", [0.002, 0.01])
+def test_wheels_of_a_robot_that_spins_are_no_copies_beside_a_camera(robot, noise):
+    """Wheels of a robot that turns in place turn alike; a camera of 60 Hz scatters, and shows no other motion."""
+    t, rng = np.arange(500) * 0.01, np.random.default_rng(0)
+    heading = 3.5 * (1.0 - np.cos(2.0 * np.pi * t / 5.0))
+    tick, turns = 2.0 * np.pi / 2048, robot.wheels.robot_radius / robot.wheels.wheel_radius
+    angle = np.repeat(np.round(turns * heading / tick)[:, None] * tick, 3, axis=1)
+    pose = np.column_stack([np.zeros(len(t)), np.zeros(len(t)), heading]) + rng.normal(0.0, noise, (len(t), 3))
+    pose[np.diff(np.floor(t * 60.0), prepend=-1.0) == 0.0] = np.nan
+    voltage = np.repeat(np.sign(np.sin(t))[:, None], 3, axis=1)
+    channels = {"voltage": voltage, "wheel_angle": angle, "pose": pose}
+    verdict = check(Log(t, channels, np.arange(len(t)) + 2, source="spin.csv"), robot)
     assert {finding.severity for finding in verdict.of("equal")} == {"note"}
 
 
