@@ -62,5 +62,18 @@ def test_wheels_of_a_robot_that_spins_are_no_copies_beside_a_camera(robot, noise
     assert {finding.severity for finding in verdict.of("equal")} == {"note"}
 
 
+def test_wheels_that_friction_holds_may_get_different_voltages():
+    """A robot that a push to the side does not move, and that then turns in place: its wheels turned alike."""
+    t = np.arange(800) * 0.01
+    spins = t >= 4.0
+    volts = np.where(spins[:, None], 8.0 * np.sin(t)[:, None], [1.0, -2.0, 1.0])
+    tick = 2.0 * np.pi / 2048
+    angle = np.where(spins, np.round(10.0 * (np.cos(4.0) - np.cos(t)) / tick) * tick, 0.0)[:, None] * np.ones(3)
+    log = Log(t, {"voltage": volts, "wheel_angle": angle}, np.arange(len(t)) + 2, source="held.csv")
+    assert {finding.severity for finding in check(log).of("equal")} == {"note"}
+    moved = Log(t, {"voltage": volts * [1.0, -1.0, 0.3], "wheel_angle": angle}, log.lines, source="copied.csv")
+    assert "error" in {finding.severity for finding in check(moved).of("equal")}
+
+
 def test_a_clean_log_has_no_copies(log, robot):
     assert not check(log, robot).of("equal")
