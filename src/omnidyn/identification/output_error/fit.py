@@ -38,7 +38,7 @@ from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.by_steps import FIT_PRECISION, solve_by_steps
 from omnidyn.identification.output_error.solve.first_point import first_point
 from omnidyn.identification.output_error.solve.loop import FINE_TOLERANCE as LOOP_FINE
-from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
+from omnidyn.identification.output_error.solve.loop import left_out, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Best, FitProgress
 from omnidyn.identification.output_error.solve.solver import (
     END_PRECISION,
@@ -442,8 +442,7 @@ class Fit:
                 start = coarse_solver.minimise(
                     retimed(coarse_solver, start, progress), progress=inner_progress
                 ).state.point
-        solution = solver.minimise(start, progress=progress)
-        return beyond_jumps(solution, progress) if loop else solution
+        return solver.minimise(start, progress=progress)
 
     def solver(self, nuisances: Sequence[str] | None = None, is_coarse: bool = False) -> Solver:
         """The solver of all that is fitted, as exact as at the end of a fit, or `is_coarse`: by a step a row."""

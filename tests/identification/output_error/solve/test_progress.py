@@ -75,7 +75,6 @@ def test_every_phase_is_told_before_it_begins(looped, log):
             "looking for a start, friction and gains 1",
             "trying latency.current, 1 of",
             "the same as exactly",
-            "looking for a better branch",
             "finding how sure",
         )
     ]

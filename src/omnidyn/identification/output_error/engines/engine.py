@@ -47,7 +47,7 @@ class FitEngine(Generic[P]):
 
     1. gives `residuals`, or `sums` where rows need not be held, and `on`;
     2. says in attributes what it is: a fit asks these, and never for its name;
-    3. gives what only some have (`with_levels`, `drives`, `meets_limit`, `of`) where its attributes promise it.
+    3. gives what only some have (`with_levels`, `drives`, `of`) where its attributes promise it.
 
     exact: takes each row in one step without error, and has `drives`. has_loop: a speed loop makes its voltages.
     tol [m/s]: tolerance of its steps, None for one a row. levels: key -> level of breakaway that it holds. members: its
@@ -104,10 +104,6 @@ class FitEngine(Generic[P]):
     def drives(self, point: Point) -> list[FloatArray]:
         """Drive of the axes [N, N, N m] in every row of every piece but the last, shape (rows, 3)."""
         raise NotImplementedError
-
-    def meets_limit(self, point: Point) -> bool:
-        """Whether a run may come near the voltage limit, where the integral of a loop stands still, at any row."""
-        return True
 
 
 def added(piece: Piece, all_columns: tuple[Column, ...], parts: Parts, weighting: Weighting, count: int) -> PieceSums:

@@ -14,16 +14,13 @@ from omnidyn.identification.output_error.engines.driver import LATENCY_PREFIX
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, through_the_end, travel_of
 from omnidyn.identification.output_error.problem.observation.observation import Shown
 from omnidyn.identification.output_error.problem.observation.observations import OBSERVATIONS
-from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
+from omnidyn.identification.output_error.problem.problem import Parts, Piece, Problem
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, looped_samples
-from omnidyn.simulation.simulate import simulate
 
 STEADY_CHANGE = 1e-10  # [m/s, A, V] a run that changes less from tick to tick stays as it is until the next command
 SLOW_LOOP = 0.5  # periods in a row, beyond which a current is seen between its ticks
-NEAR_LIMIT = 0.9  # of the voltage limit
 SLOPE_LIMIT = 1e8  # a loop that swings has derivatives that grow without bound: they are cut, for they mean nothing
 
 
@@ -52,17 +49,6 @@ class LoopEngine(ImplicitEngine):
                 where="nuisances",
             )
         super().__init__(problem, tol)
-
-    def meets_limit(self, point: Point) -> bool:
-        """Whether a run comes near the voltage limit, where the integral of the loop stands still, at any row."""
-        robot = self.problem.robot_at(point.values)
-        for piece in self.problem.pieces:
-            t, set_point = _driven(piece)
-            voltage = simulate(robot, dt=np.diff(t), wheel_speed_command=set_point[:-1], tol=self.tol).voltage
-            assert voltage is not None
-            if (np.abs(voltage) > NEAR_LIMIT * per_wheel(robot.motor.voltage_limit, voltage.shape[1])).any():
-                return True
-        return False
 
     def _piece(
         self,

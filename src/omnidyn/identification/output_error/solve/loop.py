@@ -7,7 +7,7 @@ piece must begin at rest: the integral of the loop is 0 there, anywhere else it 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from omnidyn.identification.output_error.problem.problem import Piece, Point, Pr
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import measured_twists
 from omnidyn.identification.output_error.solve.progress import FitProgress
-from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
+from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
 from omnidyn.model.keys import FRICTION, Key, friction_keys, gain_keys
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import GIVEN, Robot
@@ -39,10 +39,7 @@ LATENCY_PERIODS = 3  # periods of the loop, each way, in which a latency of the 
 GAIN_FACTORS, LEVEL_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.3, 1.0, 3.0)
 TRIAL_LATENCIES = (0.0, 0.02, 0.05, 0.1, 0.15)  # [s]
 BEST = 2  # of the latencies, and of the starts with each of them, from which the fit is carried on
-GAIN_MOVES = (1.0, -1.0, 3.0, -3.0, 6.0, -6.0)  # standard errors by which a gain is moved
-BRANCH_GAIN, ROUNDS = 1.0, 10  # of -log likelihood that counts as another branch; how often
 FEW_ITERATIONS = 8  # iterations of each before the better one is taken
-SHARES = (0.25, 0.5)  # of the longest log, from its start on, that are fitted before all of it
 
 
 def looped(records: Sequence[Record]) -> bool:
@@ -156,7 +153,7 @@ def solve_loop(problem: Problem, nu: float, progress: FitProgress) -> Solution:
     coarse_solution = first.minimise(retimed(first, coarse_solution.state.point, progress), progress=progress)
     progress.enter("the same as exactly as it must be")
     fine_solver = Solver(problem, kind.of(problem, FINE_TOLERANCE), nu)
-    return beyond_jumps(fine_solver.minimise(coarse_solution.state.point, progress=progress), progress)
+    return fine_solver.minimise(coarse_solution.state.point, progress=progress)
 
 
 def _motors_first(solver: Solver, coarse_solution: Solution, progress: FitProgress) -> Solution:
@@ -219,11 +216,6 @@ def retimed(solver: Solver, point: Point, progress: FitProgress) -> Point:
     return point
 
 
-def shortened(problem: Problem, rows: int) -> Problem:
-    """The same problem with at most so many rows of every piece: what sets off is at its beginning."""
-    return replace(problem, pieces=tuple(replace(p, last=min(p.last, p.first + rows)) for p in problem.pieces))
-
-
 def setting_off(problem: Problem) -> Problem:
     """The same problem with the rows of every piece until it has moved for a while: starts are tried on these.
 
@@ -276,64 +268,6 @@ def _moved(solver: Solver, latency: float, level: float, gain: float) -> State:
         else:
             values[j] = _within(p, p.value * (gain if p.part == DRIVE else level))
     return solver.state(Point(values, start_point.states), np.ones(len(problem.columns)) if solver.nu else None)
-
-
-def beyond_jumps(solution: Solution, progress: FitProgress) -> Solution:
-    """The solution, or a better one behind a jump of the likelihood, which no descent crosses.
-
-    An integral that stands still at the voltage limit jumps by a whole tick where a number of the robot decides on
-    which side of the limit a tick is. So the logs are fitted once more from their start on; and the gains are moved by
-    some standard errors, the others following: where F rises by less than the parabola says, there is another branch to
-    descend into. A run away from the limit has no such branch.
-    """
-    solver, below_progress = solution.solver, progress.below(solution.state.objective)
-    progress.enter("looking for a better branch, beyond jumps of the likelihood")
-    if not np.any(solver.problem.robot.drive.ki) or not solver.engine.meets_limit(solution.state.point):
-        return solution
-    grown_solution = solver.minimise(_grown(solver, solution.state.point), FEW_ITERATIONS, below_progress)
-    solution = min(solution, grown_solution, key=lambda candidate: candidate.state.objective)
-    gains = [j for j, p in enumerate(solver.problem.parameters) if p.part == DRIVE]
-    for _ in range(ROUNDS):
-        better_state = next(_branches(solver, solution, gains, progress), None)
-        new_solution = (
-            None if better_state is None else solver.minimise(better_state.point, FEW_ITERATIONS, below_progress)
-        )
-        if new_solution is None or new_solution.state.objective >= solution.state.objective - BRANCH_GAIN:
-            break
-        solution = new_solution
-    return solver.minimise(solution.state.point, progress=below_progress)
-
-
-def _grown(solver: Solver, point: Point) -> Point:
-    """The point from which all rows are fitted, found on ever more of them.
-
-    What jumps late in a log cannot pull a fit of what comes before; and once that has brought the numbers close to
-    where they belong, each later tick is on the side of the limit on which it was.
-    """
-    longest = max(p.last - p.first for p in solver.problem.pieces)
-    for share in SHARES:
-        short = shortened(solver.problem, max(int(share * longest), LEAST_ROWS))
-        short_solution = Solver(short, solver.engine.on(short), solver.nu, solver.close).minimise(point, FEW_ITERATIONS)
-        point = Point(short_solution.state.point.values, point.states)
-    return point
-
-
-def _branches(solver: Solver, solution: Solution, gains: Sequence[int], progress: FitProgress) -> Iterator[State]:
-    """States at some standard errors in a gain where F has risen by less than it should have, nearest first."""
-    normal = Normal(solver, solution.state)
-    covariance = np.linalg.pinv(normal.information, hermitian=True)
-    ways = [*itertools.product(GAIN_MOVES, gains)]
-    for k, (distance, j) in enumerate(ways):
-        progress.counted("looking for a better branch, beyond jumps of the likelihood,", k, len(ways))
-        step = distance * covariance[:, j] / np.sqrt(max(covariance[j, j], 1e-300))
-        values = solver.outer(solver.clipped(normal.inner + step))
-        state = solver.state(Point(values, solution.state.point.states), _scale(solver, solution))
-        if state.objective < solution.state.objective + 0.5 * distance * distance - BRANCH_GAIN:
-            yield state
-
-
-def _scale(solver: Solver, solution: Solution) -> FloatArray | None:
-    return solution.state.variance if solver.nu else None
 
 
 def _if_any(problem: Problem, part: str, factors: tuple[float, ...], default: float = 1.0) -> tuple[float, ...]:
