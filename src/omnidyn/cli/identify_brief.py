@@ -55,8 +55,8 @@ def _wider(planned: Beside) -> list[Statement]:
     from omnidyn.identification.planning.got import wider_than_planned
     from omnidyn.identification.verdict import of_group
 
-    found = [(group, statement) for group, got in planned.items() for statement in wider_than_planned(got)]
-    return [statement if len(planned) == 1 else of_group(group, statement) for group, statement in found]
+    warnings = [(group, statement) for group, got in planned.items() for statement in wider_than_planned(got)]
+    return [statement if len(planned) == 1 else of_group(group, statement) for group, statement in warnings]
 
 
 def _promised_cell(of: Got | None) -> str:

@@ -102,8 +102,8 @@ def _beyond_noise(expected: FloatArray, speed: FloatArray | None, j: int, k: int
     """
     if speed is None or max(j, k) >= min(speed.shape[1], expected.shape[1]):
         return True
-    known = np.isfinite(speed[:, j]) & np.isfinite(expected[:, [j, k]]).all(axis=1)
-    one, pair = speed[known, j], expected[known][:, [j, k]]
+    logged = np.isfinite(speed[:, j]) & np.isfinite(expected[:, [j, k]]).all(axis=1)
+    one, pair = speed[logged, j], expected[logged][:, [j, k]]
     if not one.any():
         return True
     misses = np.abs(pair - np.outer(one, one @ pair / (one @ one)))
