@@ -100,6 +100,8 @@ def tables(draw):
 @example(text="a;b\n1;1,500\n2;3\n3;0.5", rows=1, block=7, skip=False)
 @example(text="a;b\n1;2\n2;3\n3;1,500", rows=2, block=3, skip=False)
 @example(text="a,b\r\n1,2\r\n3,4", rows=1, block=1, skip=False)
+@example(text="a,b\n,0.0\nword,0.0", rows=2, block=1, skip=False)
+@example(text="a,b\n7,0.0\nword,0.0", rows=2, block=1, skip=False)
 def test_a_boundary_changes_nothing(tmp_path_factory, text, rows, block, skip):
     path = tmp_path_factory.mktemp("table") / "table.csv"
     path.write_bytes(text.encode())

@@ -49,16 +49,21 @@ class Reader(NamedTuple):
 def completed(tables: Iterable[FileTable], minimum: str, rows: int = 0) -> Iterator[FileTable]:
     """The tables that have rows, each once the next one is there: so the last of them has the hash and all notes.
 
-    rows: small ones that follow each other, as those of a dataset with a file per episode, are joined up to so many.
+    rows: small ones that follow each other, as those of a dataset with a file per episode, are joined up to so many,
+    but none of numbers to one of words: the text of its cells is gone.
     """
     waiting: list[FileTable] = []
     table = None
     for table in tables:
         if len(table):
-            if waiting and sum(map(len, waiting)) + len(table) > rows:
+            if waiting and (sum(map(len, waiting)) + len(table) > rows or _wordy(table) != _wordy(waiting[-1])):
                 yield join(waiting)
                 waiting = []
             waiting.append(table)
     if not waiting:
         raise InputError("no rows", got="0 samples", expected=minimum, where=table.source if table is not None else "")
     yield replace(join(waiting), sha256=table.sha256, notes=table.notes)  # type: ignore[union-attr]
+
+
+def _wordy(table: FileTable) -> list[str]:
+    return [name for name, column in table.columns.items() if isinstance(column, tuple)]
