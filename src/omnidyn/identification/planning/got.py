@@ -59,9 +59,7 @@ def beside(promises: Promises, estimate: Estimate) -> dict[str, Got]:
 
 def wider_than_planned(got: Mapping[str, Got]) -> list[Statement]:
     """A warning about the number whose interval is wider than planned by the largest factor, beyond `WIDER`."""
-    times = {
-        name: one.got / one.planned for name, one in got.items() if one.planned > 0.0 and math.isfinite(one.got)
-    }
+    times = {name: one.got / one.planned for name, one in got.items() if one.planned > 0.0 and math.isfinite(one.got)}
     name = max(times, key=times.__getitem__, default="")
     if not name or times[name] <= WIDER:
         return []
