@@ -117,3 +117,10 @@ def test_a_signal_is_missed_where_its_errors_are_large_and_no_noise():
     assert is_missed(0.51, 3.1, 1.0)
     assert not is_missed(0.49, 3.1, 1.0)
     assert not is_missed(0.51, 2.9, 1.0)
+
+
+def test_a_signal_that_hardly_moves_cannot_be_missed():
+    """Fit -99 %: errors of twice a spread of 2.9 times the noise say nothing; a dead sensor has no noise."""
+    assert not is_missed(1.99, 1.99 * 2.9, 1.0)
+    assert is_missed(1.99, 1.99 * 3.1, 1.0)
+    assert is_missed(1.99, 1.99 * 2.9, 0.0)

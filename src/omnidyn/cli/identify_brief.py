@@ -7,12 +7,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from omnidyn.cli.terminal.telling import brief_document
-from omnidyn.document import Document, Table, Words, apart, interval_cell, percent_cell, sentence
+from omnidyn.document import Document, Points, Table, Words, apart, interval_cell, percent_cell, sentence
 
 if TYPE_CHECKING:
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.identification import Identification
     from omnidyn.identification.planning.got import Got
+    from omnidyn.statement import Statement
 
 
 Beside = Mapping[str, Mapping[str, "Got"]]  # group -> key -> what a plan promised and what the fit has
@@ -27,7 +28,8 @@ def brief(result: Identification, planned: Beside | None = None) -> Document:
         of_row = [planned[group] for group, estimate in result.groups.items() for _ in _rows(group, estimate, groups)]
         rows = [(*row[:3], _promised_cell(of.get(row[-1])), *row[3:]) for row, of in zip(rows, of_row, strict=True)]
     of_study = result.study.warnings if result.study is not None else ()
-    warnings = [*of_study, *(warning for estimate in result.groups.values() for warning in estimate.warnings)]
+    of_plan = _wider(planned) if planned else []
+    warnings = [*of_plan, *of_study, *(warning for estimate in result.groups.values() for warning in estimate.warnings)]
     table = Table(head, rows, align)
     blocks = [fit.held_out.statement() for fit in result.fits.values() if fit.held_out is not None]
     words = [Words(sentence(str(statement))) for statement in blocks]
@@ -43,7 +45,18 @@ def with_plan(document: Document, planned: Beside) -> Document:
     ]
     table = Table(("group", "key", "95 % planned +- %", "worst %", "got %"), rows, "<<>", name="planned")
     data = {group: {name: one._asdict() for name, one in numbers.items()} for group, numbers in planned.items()}
-    return replace(document, parts=apart(document.parts, [table]), data={**document.data, "planned": data})
+    warnings = Points(_wider(planned), mark="", name="wider than planned")
+    parts = apart(document.parts, [table], [warnings] if warnings.words else [])
+    return replace(document, parts=parts, data={**document.data, "planned": data})
+
+
+def _wider(planned: Beside) -> list[Statement]:
+    """What is known much less well than planned, by group."""
+    from omnidyn.identification.planning.got import wider_than_planned
+    from omnidyn.identification.verdict import of_group
+
+    warnings = [(group, statement) for group, got in planned.items() for statement in wider_than_planned(got)]
+    return [statement if len(planned) == 1 else of_group(group, statement) for group, statement in warnings]
 
 
 def _promised_cell(of: Got | None) -> str:

@@ -94,12 +94,13 @@ def nothing_followed(signals: Sequence[FollowedSignal]) -> bool:
 
 
 def is_missed(share: float, error: float, scatter: float = 0.0) -> bool:
-    """Whether a model misses a signal: its errors are more than half of the spread, and no noise.
+    """Whether a model misses a signal: its errors are more than half of the spread, and neither is noise.
 
     share: error over spread. error: its rms. scatter: by how much the signal scatters from row to row
-    (`statistics.difference_noise`), in the same unit; a signal of mere noise is not to blame. At 0: of no noise.
+    (`statistics.difference_noise`), in the same unit; a signal of mere noise, as of a position that hardly moves, can
+    not be followed, and is not to blame. At 0: of no noise.
     """
-    return share > HALF and error > ROUGH_ERROR * scatter
+    return share > HALF and error > ROUGH_ERROR * scatter * max(share, 1.0)
 
 
 def plain_name(component: str) -> str:

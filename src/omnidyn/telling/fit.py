@@ -47,6 +47,16 @@ CURES = (
 )
 
 
+def _wider_than_planned(statement: Statement) -> str:
+    """An interval is much wider than was planned."""
+    n = statement.numbers
+    return (
+        f"{in_words(statement.subject)} is known within {100.0 * n['got']:.2g} %, {n['times']:.2g} times as wide as "
+        "planned: the model misses something, and a number may be farther off than its interval says; identify "
+        "without --quick looks for it"
+    )
+
+
 def _size_fitted(statement: Statement) -> str:
     """Wheel radius and inertia are fitted too, for a latency stood in for them."""
     numbers = statement.numbers
@@ -354,6 +364,7 @@ SENTENCES = {
     "combined_sets_off": Sentence(_combined("voltage at which it sets off", "dead band and Coulomb friction")),
     "combined_follows": Sentence(_combined("by how much it follows late", "latency and lag")),
     "not_followed": Sentence(_not_followed),
+    "wider_than_planned": Sentence(_wider_than_planned),
     "not_shown": Sentence(_not_shown),
     "cures": Sentence(_cures),
 }

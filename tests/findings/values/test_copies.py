@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.findings.check import check
+from omnidyn.logs.log import Log
 
 
 def copied(values, of=0, into=1):
@@ -44,6 +45,34 @@ def test_wheels_that_turn_alike_without_noise_are_a_note(log, with_channels):
     voltage = 0.4 * speed
     verdict = check(with_channels(wheel_speed=speed, voltage=voltage, current=None, twist=None, pose=None))
     assert {finding.severity for finding in verdict.of("equal")} == {"note"}
+
+
+@pytest.mark.parametrize("noise", [0.002, 0.01])
+def test_wheels_of_a_robot_that_spins_are_no_copies_beside_a_camera(robot, noise):
+    """Wheels of a robot that turns in place turn alike; a camera of 60 Hz scatters, and shows no other motion."""
+    t, rng = np.arange(500) * 0.01, np.random.default_rng(0)
+    heading = 3.5 * (1.0 - np.cos(2.0 * np.pi * t / 5.0))
+    tick, turns = 2.0 * np.pi / 2048, robot.wheels.robot_radius / robot.wheels.wheel_radius
+    angle = np.repeat(np.round(turns * heading / tick)[:, None] * tick, 3, axis=1)
+    pose = np.column_stack([np.zeros(len(t)), np.zeros(len(t)), heading]) + rng.normal(0.0, noise, (len(t), 3))
+    pose[np.diff(np.floor(t * 60.0), prepend=-1.0) == 0.0] = np.nan
+    voltage = np.repeat(np.sign(np.sin(t))[:, None], 3, axis=1)
+    channels = {"voltage": voltage, "wheel_angle": angle, "pose": pose}
+    verdict = check(Log(t, channels, np.arange(len(t)) + 2, source="spin.csv"), robot)
+    assert {finding.severity for finding in verdict.of("equal")} == {"note"}
+
+
+def test_wheels_that_friction_holds_may_get_different_voltages():
+    """A robot that a push to the side does not move, and that then turns in place: its wheels turned alike."""
+    t = np.arange(800) * 0.01
+    spins = t >= 4.0
+    volts = np.where(spins[:, None], 8.0 * np.sin(t)[:, None], [1.0, -2.0, 1.0])
+    tick = 2.0 * np.pi / 2048
+    angle = np.where(spins, np.round(10.0 * (np.cos(4.0) - np.cos(t)) / tick) * tick, 0.0)[:, None] * np.ones(3)
+    log = Log(t, {"voltage": volts, "wheel_angle": angle}, np.arange(len(t)) + 2, source="held.csv")
+    assert {finding.severity for finding in check(log).of("equal")} == {"note"}
+    moved = Log(t, {"voltage": volts * [1.0, -1.0, 0.3], "wheel_angle": angle}, log.lines, source="copied.csv")
+    assert "error" in {finding.severity for finding in check(moved).of("equal")}
 
 
 def test_a_clean_log_has_no_copies(log, robot):

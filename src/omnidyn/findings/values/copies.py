@@ -6,11 +6,11 @@ from itertools import combinations
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import expected_wheel_speed
-from omnidyn.findings.signal.robust import quantum, white_noise
+from omnidyn.findings.signal.robust import quantum, rest_level, white_noise
 from omnidyn.logs.channels import components
 from omnidyn.sensors import COUNTED, SENSORS
 from omnidyn.statement import ERROR, NOTE
@@ -19,6 +19,7 @@ MEASURED = tuple(name for name in SENSORS if name != "pose")
 VALUES = 20  # different ones, at least: fewer may agree by chance
 OPPOSITE = -0.9  # correlation of two that turn against each other
 DIFFERENT = 0.1  # of the larger of two inputs, by which they differ
+BEYOND = 3.0  # times what an expected speed misses the logged one by, its noise
 NOISY = 1e-3  # of the largest value: so much noise is never the same twice
 
 
@@ -57,11 +58,13 @@ def _are_equal(one: FloatArray, other: FloatArray) -> bool:
 def _reason(work: LogUnderCheck, channel: str, j: int, k: int) -> str:
     """Why two components cannot be equal, a reason of `telling`; "" where they may."""
     if channel != "twist":
+        speed = work.get("wheel_speed")
         for name in ("voltage", "duty", "wheel_speed_command"):
-            if _differ(work.get(name), j, k):
+            inputs = work.get(name)
+            if inputs is not None and _differ(inputs[_turning(speed, j, len(inputs))], j, k):
                 return name
         expected = expected_wheel_speed(work, without="wheel_speed") if channel != "current" else None
-        if expected is not None and _differ(expected[1], j, k):
+        if expected is not None and _differ(expected[1], j, k) and _beyond_noise(expected[1], speed, j, k):
             return expected[0]
     values = work.channels[channel][:, j]
     largest = float(np.nanmax(np.abs(values)))
@@ -83,3 +86,25 @@ def _differ(values: FloatArray | None, j: int, k: int) -> bool:
         return False
     apart, size = np.quantile(np.abs(one - other), 0.95), np.quantile(np.abs(pair), 0.95)
     return bool(apart > DIFFERENT * size > 0.0)
+
+
+def _turning(speed: FloatArray | None, j: int, rows: int) -> BoolArray:
+    """Rows in which a wheel turns, all where no speed was logged: friction holds wheels that get different voltages."""
+    if speed is None or j >= speed.shape[1]:
+        return np.ones(rows, dtype=bool)
+    return np.abs(speed[:, j]) > rest_level(speed[:, j])
+
+
+def _beyond_noise(expected: FloatArray, speed: FloatArray | None, j: int, k: int) -> bool:
+    """Whether two expected speeds differ by more than their noise: by what the better of them misses the logged one.
+
+    speed: as logged, of any scale and sign. A robot that only spins turns its wheels alike, whatever a camera scatters.
+    """
+    if speed is None or max(j, k) >= min(speed.shape[1], expected.shape[1]):
+        return True
+    logged = np.isfinite(speed[:, j]) & np.isfinite(expected[:, [j, k]]).all(axis=1)
+    one, pair = speed[logged, j], expected[logged][:, [j, k]]
+    if not one.any():
+        return True
+    misses = np.abs(pair - np.outer(one, one @ pair / (one @ one)))
+    return bool(np.quantile(np.abs(pair[:, 0] - pair[:, 1]), 0.95) > BEYOND * np.quantile(misses, 0.95, axis=0).min())

@@ -11,9 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from omnidyn.arguments import is_number
 from omnidyn.errors import InputError
 from omnidyn.files import MAX_TEXT_BYTES, read_bytes
+from omnidyn.statement import WARNING, Statement
 
 if TYPE_CHECKING:
     from omnidyn.identification.estimate import Estimate
+
+
+WIDER = 5.0  # times the planned interval: nuisances of a fit alone make it up to 3 times as wide
 
 
 class Got(NamedTuple):
@@ -51,6 +55,15 @@ def beside(promises: Promises, estimate: Estimate) -> dict[str, Got]:
     return {
         name: Got(*shares, estimate.half_width(name)) for name, shares in promises.items() if name in estimate.value
     }
+
+
+def wider_than_planned(got: Mapping[str, Got]) -> list[Statement]:
+    """A warning about the number whose interval is wider than planned by the largest factor, beyond `WIDER`."""
+    times = {name: one.got / one.planned for name, one in got.items() if one.planned > 0.0 and math.isfinite(one.got)}
+    name = max(times, key=times.__getitem__, default="")
+    if not name or times[name] <= WIDER:
+        return []
+    return [Statement("wider_than_planned", WARNING, name, {"times": times[name], "got": got[name].got})]
 
 
 def _share(value: Any) -> float:
