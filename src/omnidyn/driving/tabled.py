@@ -29,7 +29,7 @@ def check_table(program: DriveProgram, table: WheelTable) -> None:
             "the table of another robot",
             got=f"{wheels} wheels",
             expected=f"{robot.wheels.count}, as {robot.name} has",
-            remedy=f"write one from a log of {robot.name} with omnidyn check --wheel-table",
+            remedy=f"write one from a log of {robot.name} with `wheel_table`",
             where="wheel_table",
         )
     try:

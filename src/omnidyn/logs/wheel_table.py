@@ -67,7 +67,7 @@ class WheelTable(Displayable):
                 "no table of wheels",
                 got=f"{len(self.lines)} rows",
                 expected="two rows for each wheel, 1 and on, direction 1 and -1",
-                remedy="write it with omnidyn check --wheel-table",
+                remedy="write it with `wheel_table`",
                 where="lines",
             )
         for line in self.lines:
@@ -89,7 +89,7 @@ class WheelTable(Displayable):
                 "no speeds of a wheel",
                 got=f"dead band {line.dead_band:g}, asked up to {line.most:g}, missed {line.missed:g} of {place}",
                 expected="rad/s, 0 or more, the dead band below the largest that was asked for",
-                remedy="write the table again with omnidyn check --wheel-table",
+                remedy="write the table again with `wheel_table`",
                 where="lines",
             )
 

@@ -53,7 +53,7 @@ def _wider_than_planned(statement: Statement) -> str:
     return (
         f"{in_words(statement.subject)} is known within {100.0 * n['got']:.2g} %, {n['times']:.2g} times as wide as "
         "planned: the model misses something, and a number may be farther off than its interval says; identify "
-        "without --quick looks for it"
+        "without `quick` looks for it"
     )
 
 

@@ -151,11 +151,6 @@ def test_a_robot_that_does_not_stop_has_no_plan():
         omnidyn.plan(heavy, ROOM, 20.0, noise=NOISE)
 
 
-def test_a_firmware_that_holds_speeds_is_refused_with_a_reason():
-    with pytest.raises(omnidyn.OmnidynError, match="holds the speeds"):
-        omnidyn.plan(omnidyn.load_robot("lekiwi"))
-
-
 def test_the_command_writes_two_programs_that_simulate_reads(tmp_path):
     out = tmp_path / "plan.csv"
     words = ("plan", "axebot", "--time", "20", "--noise", "twist=0.02,0.02,0.1")

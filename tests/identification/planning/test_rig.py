@@ -104,3 +104,8 @@ def test_the_command_writes_a_program_for_one_motor(tmp_path):
 def test_what_cannot_be_planned_for_a_motor_is_refused(wrong, words):
     with pytest.raises(omnidyn.OmnidynError, match=words):
         omnidyn.plan_rig(AXEBOT, **wrong)
+
+
+def test_a_firmware_that_holds_speeds_is_refused_with_a_reason():
+    with pytest.raises(omnidyn.OmnidynError, match="holds the speeds"):
+        omnidyn.plan_rig(omnidyn.load_robot("lekiwi"))

@@ -9,8 +9,7 @@ import numpy as np
 
 from omnidyn.arguments import is_number
 from omnidyn.arrays import FloatArray
-from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.model.drive import SPEED
+from omnidyn.errors import InputError
 from omnidyn.model.motor import traction
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import GRAVITY
@@ -19,17 +18,6 @@ from omnidyn.run import Run
 
 GRIP = "wheels.traction_mu"
 GRIP_SHARE = 0.8  # of what the file says the floor takes
-
-
-def refuse_set_points(robot: Robot) -> None:
-    """Raises UnsupportedError for a robot whose firmware holds the speeds of its wheels."""
-    if robot.drive.kind == SPEED:
-        raise UnsupportedError(
-            "a firmware holds the speeds of the wheels: no plan is made for its set points",
-            got=robot.name,
-            expected="a robot that takes volts or duties",
-            remedy="plan for the same robot without [drive] kind = speed, if its motors can be driven directly",
-        )
 
 
 class PlanLimits(NamedTuple):

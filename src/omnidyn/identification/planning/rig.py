@@ -18,16 +18,15 @@ import numpy as np
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Points, Table, percent_cell, plain
-from omnidyn.errors import InputError, OmnidynError
+from omnidyn.errors import InputError, OmnidynError, UnsupportedError
 from omnidyn.identification.methods import MotorFit
 from omnidyn.identification.motors.estimate import BAND, LAG, OFFSET, SLOPE, MotorEstimate
 from omnidyn.identification.motors.log import motor_logs
 from omnidyn.identification.motors.start import START, STOP
 from omnidyn.identification.motors.steady_curve import curves_of_logs
 from omnidyn.identification.motors.study import study_motors
-from omnidyn.identification.planning.limits import refuse_set_points
 from omnidyn.identification.planning.recorded import noise_of
-from omnidyn.model.drive import DUTY
+from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 from omnidyn.progress import Progress, Report, silent
@@ -157,7 +156,14 @@ def plan_rig(
     for name, value, least, most in (("seconds", seconds, SHORTEST, LONGEST), ("rate", rate, 20.0, 1000.0)):
         if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
             raise InputError("out of range", got=value, expected=f"{least:g} to {most:g}", where=name)
-    refuse_set_points(robot)
+    if robot.drive.kind == SPEED:
+        raise UnsupportedError(
+            "a firmware holds the speeds of the wheels: what a motor does with volts cannot be planned behind it",
+            got=robot.name,
+            expected="a robot that takes volts or duties",
+            remedy="leave `rig` out: the whole robot is planned in set points; or plan for the same motor without "
+            "[drive] kind = speed, if it can be driven directly",
+        )
     dt, motor, is_duty = 1.0 / rate, robot.motor, robot.drive.kind == DUTY
     stds = {name: std for name, std in noise_of(robot, dt, noise).items() if name.startswith("wheel_")}
     if not stds:
