@@ -67,7 +67,7 @@ def figures(package: Path) -> dict[str, str]:
         f"files of fewer than {SHORT} lines, no __init__": f"{len(short_files(texts))}",
         "modules imported from exactly one": f"{len(with_one_importer(every))}",
         "names of classes that stand twice": f"{len(names_of_classes_twice(trees))}",
-        "second modules glued into a file": f"{sum(len(glued(path.read_text(), tree)) for path, tree in by_path.items())}",
+        "second modules glued into a file": f"{sum(len(glued(path.read_text(), by_path[path])) for path in texts)}",
         f"names that are {', '.join(FORBIDDEN)}": f"{sum(map(forbidden, trees))}",
         "names of files that stand five times": f"{names_of_files(texts)}",
         "modules missing from maps": f"{sum(len(missing(folder)) for folder in {path.parent for path in texts})}",
