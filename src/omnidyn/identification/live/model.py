@@ -36,7 +36,7 @@ from omnidyn.run import Run
 from omnidyn.statistics import difference_noise
 
 ROUNDS, START_ROUNDS = 3, 3  # of numbers and noise in turn; until it is known where a stretch begins
-LINEAR_STEPS = 2  # of the fit's solver, when all rows that are kept are taken anew
+LINEAR_STEPS = 4  # of the fit's solver, when all rows that are kept are taken anew
 RECENT = 3  # stretches that are compared with a fit before
 SIGNAL = 3.0  # times its noise, that an output must vary by in a stretch that judges
 UNEXPLAINED = 2.0  # times the noise: the mean square that the numbers of all rows leave of a stretch that they miss
@@ -157,12 +157,12 @@ class LiveModel:
         if made is None:
             return
         solver = self._solver_of(made)
-        point, rounds = Point(self.values, made.start().states), START_ROUNDS
+        start = self._state_at(solver, Point(self.values, made.start().states))
         if self.past is None:  # else the rows alone say less than all that was
-            scales = self._noise_of(solver) if solver.scaled.any() else None
-            point, rounds = solver.minimise(point, LINEAR_STEPS, scales=scales).state.point, 1
-            self.values = point.values
-        start = self._state_at(solver, point, rounds)
+            scales = start.variance if solver.scaled.any() else None
+            found = solver.minimise(start.point, LINEAR_STEPS, scales=scales).state
+            self.values = found.point.values
+            start = self._state_at(solver, found.point, 1)
         self.sums, self.open = Quadratic.of(solver, start, self.problem.columns), self._empty()
         self._settle()
         self.fitted_at, self.linear_at, self.start, self._open = end, self.values, end, self.uncertainty.open
@@ -214,14 +214,10 @@ class LiveModel:
     def _solver_of(self, problem: Problem) -> Solver[Problem]:
         return Solver(problem, self._engine.on(problem), counts_ticks=bool(self.counted.any()))
 
-    def _noise_of(self, solver: Solver[Problem]) -> FloatArray:
-        """Variance of the noise of each column of a solver."""
-        noise = dict(zip(self.problem.columns, self.variance, strict=True))
-        return np.array([noise.get(column, 1.0) for column in solver.problem.columns])
-
     def _state_at(self, solver: Solver[Problem], point: Point, rounds: int = START_ROUNDS) -> State:
         """The state at the numbers of a point, where the pieces begin found in some rounds."""
-        variance = self._noise_of(solver)
+        noise = dict(zip(self.problem.columns, self.variance, strict=True))
+        variance = np.array([noise.get(column, 1.0) for column in solver.problem.columns])
         still, none = np.ones(len(point.values), bool), np.zeros(len(point.values))
 
         def at(point: Point) -> State:
