@@ -14,10 +14,8 @@ from omnidyn.run import Run
 
 SHORTEST = 3.0  # [s] that are worth a drive
 SAME, SAME_SHARE = 1e-3, 0.8  # of the largest input; of the rows: a row may be left out of a log
-LATE, SLOWER = (
-    0.5,
-    0.25,
-)  # [s] that a row may be late beside the one before; of the time: that all of it may take longer
+LATE = 0.5  # [s] that a row may be late beside the one before
+SLOWER = 0.25  # of the time: that all of it may take longer
 REMEDY = "give the logs of this program in the order in which they were driven"
 
 
