@@ -44,3 +44,4 @@ def test_an_interval_much_wider_than_planned_is_named_first():
     assert text.index("70 times") < text.index("of little weight")
     as_planned = {keys[0]: Got(0.0002, 0.0003, 0.00098), keys[1]: Got(float("inf"), float("inf"), 0.1)}
     assert "as planned" not in brief(found, {"": as_planned}).to_text()
+    assert "140 times as wide" in brief(found, {"": {keys[0]: Got(0.0001, 0.0003, 0.014)}}).to_text()

@@ -62,6 +62,7 @@ def test_it_stays_or_goes_away_with_the_fitted_robot(log, robot):
     assert not after.of("energy")
     assert "with the fitted robot this is no longer found" in str(after.of("judged_again")[0])
     assert any(report.urgent and "this is no longer found" in str(report) for report in told)
+    assert not any(": :" in str(report) for report in told)
 
 
 def test_nothing_is_checked_twice_where_nothing_was_guessed(log, robot):

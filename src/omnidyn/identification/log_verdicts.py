@@ -47,7 +47,7 @@ def judged_by_fit(
         for verdict, log in zip(verdicts, logs, strict=True)
     ]
     for source, finding in gone_by_fit(new_verdicts):
-        progress(Report(f"{source or 'the log'}: {finding.subject}: {finding}", urgent=True))
+        progress(Report(": ".join(filter(None, (source or "the log", finding.subject, str(finding)))), urgent=True))
     return tuple(new_verdicts)
 
 

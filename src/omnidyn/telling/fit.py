@@ -51,7 +51,7 @@ def _wider_than_planned(statement: Statement) -> str:
     """An interval is much wider than was planned."""
     n = statement.numbers
     return (
-        f"{in_words(statement.subject)} is known within {100.0 * n['got']:.2g} %, {n['times']:.2g} times as wide as "
+        f"{in_words(statement.subject)} is known within {100.0 * n['got']:.2g} %, {short(n['times'])} times as wide as "
         "planned: the model misses something, and a number may be farther off than its interval says; identify "
         "without `quick` looks for it"
     )

@@ -43,6 +43,7 @@ SLOWEST, FASTEST = 5.0, 1000.0  # [Hz]
 DOUBTED = ("gain", "dead_band")  # what a fit may need beside the numbers of the file: moves must tell that apart too
 SEED = 0  # of the robots and of the noise
 REST = 1.0  # [s] before the first move
+OPENING = 1.2  # [s] of a first ramp: a longer one tells less than the steps that it takes the time of
 VOLUME = PlanAim().score([])
 
 
@@ -345,9 +346,8 @@ def _opening(moves: Sequence[TriedMove]) -> list[PlannedMove]:
     """Slow ramps through the dead zone, the least that move it: a spin first, which needs no room, then x and y."""
     opening = []
     for direction in (TURN, FORWARD, SIDEWAYS):
-        fitting = [one.move for one in moves if one.move.direction == direction and one.move.shape == RAMP]
-        longest = max((move.seconds for move in fitting), default=0.0)
-        opening += sorted((move for move in fitting if move.seconds == longest), key=lambda move: move.level)[:1]
+        ramps = [one.move for one in moves if one.move.direction == direction and one.move.shape == RAMP]
+        opening += sorted(ramps, key=lambda move: (abs(move.seconds - OPENING), move.level))[:1]
     return opening
 
 
