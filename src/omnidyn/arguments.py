@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Iterable, Iterator
 from numbers import Integral, Real
 
 import numpy as np
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, did_you_mean
 
 # What to call instead, by the name of the type that is wanted.
 MADE_BY = {
@@ -93,12 +92,11 @@ def check_order(call: str, *places: tuple[object, Kinds]) -> None:
 
 def unknown_option(owner: str, option: str, options: Iterable[str], where: str) -> InputError:
     """The error of an option that something does not have, with the nearest that it has."""
-    matches = difflib.get_close_matches(option, list(options), 1, 0.4)
     return InputError(
         f"{owner} has no such option",
         got=option,
         expected=", ".join(options),
-        remedy=f"did you mean {matches[0]}?" if matches else "",
+        remedy=did_you_mean(option, options),
         where=where,
     )
 

@@ -131,14 +131,6 @@ def path_of_file(path: str | os.PathLike) -> Polyline:
     from omnidyn.logs.readers.read_table import read_table  # imported lazily: named paths need no reader
 
     table = read_table(path)
-    absent = [name for name in COLUMNS if name not in table.names]
-    if absent:
-        raise InputError(
-            "no path in this file",
-            got=", ".join(table.names),
-            expected=", ".join(COLUMNS),
-            remedy=f"add {', '.join(absent)}",
-            where=table.source,
-        )
+    table.require(COLUMNS, what="no path in this file")
     t, *pose = (table.measured(name) for name in COLUMNS)
     return lines(t, np.column_stack(pose), str(table.source))

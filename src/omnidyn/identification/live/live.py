@@ -158,8 +158,8 @@ class Live:
     def finish(self) -> LiveStatus:
         """The answer when the drive has ended: all rows that are kept fitted anew.
 
-        Where errors remember, the likelihood has several optima some tenths of a standard error apart; this is the one
-        at which `identify` ends too, as long as the log is no longer than a whole fit here.
+        Where errors are autocorrelated, the likelihood has several optima, some tenths of a standard error apart. This
+        is the one at which `identify` ends too, as long as the log is no longer than a whole fit here.
         """
         if self._rows.last - self._start >= FIRST and self._fitted_at < self._rows.last:
             self._fit(self._rows.last)

@@ -270,7 +270,7 @@ class Fit:
         }
 
     def weighed(self, solution: Solution, progress: FitProgress | None = None, may_refit: bool = True) -> Weighed:
-        """The trust in a solution; where its errors remember, that in the fit made anew for it, and its point.
+        """The trust in a solution, and its point; where its errors are autocorrelated, those of the fit made anew.
 
         may_refit: whether there is time for that; after an interrupt there is none.
 

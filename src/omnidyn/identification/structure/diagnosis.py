@@ -76,7 +76,7 @@ def examine(solution: Solution) -> Examined:
     problem, misfit_result = rows.problem, misfit(rows, piece_motions)
     stable = stability(misfit_result.linear)
     bench = Workbench(problem, point, type(solver.engine), piece_motions, stable.likely)
-    causes = [*candidates(bench), *unoffered(bench)]
+    causes = [*candidates(bench), *unoffered()]
     candidate_trials = _tried(bench, [candidate for candidate in causes if not candidate.is_late])
     ranking = remedies(misfit_result.linear, candidate_trials, misfit_result.columns_by_piece)
     count = int(sum(mask.sum() for mask in rows.masks))
