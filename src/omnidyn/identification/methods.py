@@ -18,7 +18,7 @@ from omnidyn.errors import InputError
 AUTO, NONE = "auto", "none"
 OUTPUT_ERROR, STEADY_STATE = "output-error", "steady-state"
 GAUSS, STUDENT = "gaussian", "student-t"
-NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
+NU = 4.0  # degrees of freedom of Student's t: 2 % of outliers hardly count, 95 % efficient without them
 REST, FREE = "rest", "free"
 LINE = "line"  # a shape: the paper's line on each axis
 HOLD_OUT, GROUPS, QUICK = "hold_out", "groups", "quick"  # what `identify` takes for some of the methods

@@ -335,8 +335,8 @@ SENTENCES = {
     "not_white": Sentence(_not_white),
     "autocorrelated_noise": Sentence(_memory),
     "short_for_memory": Sentence(
-        "the errors of {subject} are correlated over {memory:~.2g} s, and the logs last {times:.1f} times that: the memory "
-        "is hardly known, nor are the intervals; record {enough:~.2g} s or more"
+        "the errors of {subject} are correlated over {memory:~.2g} s, and the logs last {times:.1f} times that: the "
+        "memory is hardly known, nor are the intervals; record {enough:~.2g} s or more"
     ),
     "uneven_rows": Sentence(
         "{share:.0%} of the rows do not come at even times: the errors are taken to forget as much from each row to "

@@ -46,7 +46,7 @@ class AutoRegression:
     """partial (p,): partial correlations, each within -1 to 1, so that the series is stationary. variance: of what is
     new in a row. rows: that it was fitted to. adds_up: whether all this is of the changes from row to row. slopes
     (p, q): of phi by the q numbers that it was fitted by, where these are not phi itself. moving: phi and
-    lambda of errors that are autocorrelated only while the robot moves, see moving.py; all else is theirs while it does.
+    lambda of errors that are autocorrelated only while the robot moves, see moving.py; all else is theirs then.
     information (q, q): that all rows have of the q numbers, where they do not tell as much as rows without end."""
 
     partial: FloatArray
