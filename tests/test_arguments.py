@@ -1,4 +1,4 @@
-"""Arguments in each other's place: both are named, in one sentence."""
+"""Arguments that are swapped: both are named, in one sentence."""
 
 from pathlib import Path
 
@@ -40,7 +40,7 @@ TABLE = omnidyn.read_steady_table(Path(__file__).resolve().parents[1] / "example
     ],
 )
 def test_a_swapped_pair_is_recognised(call, got, expected):
-    with pytest.raises(InputError, match=f"each other's place; got {got}; expected .*{expected}"):
+    with pytest.raises(InputError, match=f"arguments swapped; got {got}; expected .*{expected}"):
         call()
 
 
@@ -102,5 +102,5 @@ def test_random_numbers_come_from_a_seed_or_a_generator():
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
     for wrong in (-1, 1.5, "one", True):
-        with pytest.raises(InputError, match=r"rng: no source of random numbers.*expected a whole number"):
+        with pytest.raises(InputError, match=r"rng: not a source of random numbers.*expected a whole number"):
             seed_of(wrong)

@@ -244,7 +244,7 @@ def check_dt(dt: float) -> float:
 def check_delay(delay: int | None) -> int | None:
     """Steps until an output acts. Raises InputError outside 0..100."""
     if delay is not None and (isinstance(delay, bool) or delay != int(delay) or not 0 <= delay <= MOST_DELAY):
-        raise InputError("no delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
+        raise InputError("not a delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
     return delay
 
 

@@ -124,7 +124,7 @@ def instruments(wanted: str | Instruments | Sensors | None, robot: Robot) -> Ins
         return Instruments(wanted)
     if not isinstance(wanted, str):
         raise InputError(
-            "no sensors", got=type(wanted).__name__, expected='a text such as "encoder:2048"', where="sensors"
+            "not sensors", got=type(wanted).__name__, expected='a text such as "encoder:2048"', where="sensors"
         )
     return _read(wanted)
 

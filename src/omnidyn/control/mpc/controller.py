@@ -348,7 +348,7 @@ class Mpc:
 
 
 def _whole(name: str, value: Any, low: int, high: int) -> int:
-    """A whole number in a range. Raises InputError for anything else."""
+    """An integer in a range. Raises InputError for anything else."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
-        raise InputError("no whole number in range", got=value, expected=f"{low} to {high}", where=name)
+        raise InputError("not an integer in the range", got=value, expected=f"{low} to {high}", where=name)
     return int(value)

@@ -116,7 +116,7 @@ def _path_of_value(what: Any, options: Mapping[str, Any]) -> Path:
         rows: FloatArray = np.empty((0, 0))
     if rows.ndim != 2 or rows.shape[1] != len(COLUMNS):
         raise InputError(
-            "no path",
+            "not a path",
             got=f"{type(what).__name__}{f' of shape {rows.shape}' if rows.size else ''}",
             expected=f"a name, a file, a Run, a function, an object with at(t), or rows of {', '.join(COLUMNS)}",
             where="path",
@@ -135,7 +135,7 @@ def _parsed(text: str, source: str) -> dict[str, str]:
     for part in filter(None, text.split(",")):
         name, sign, value = part.partition("=")
         if not sign:
-            raise InputError("no option of a path", got=part, expected="name=value", where=source)
+            raise InputError("not an option of a path", got=part, expected="name=value", where=source)
         options[name.strip()] = value.strip()
     return options
 

@@ -93,7 +93,7 @@ class Fit:
         progress: FitProgress | None = None,
         start_by_group: Mapping[str, tuple[Robot, OutputError]] | None = None,
     ) -> Fit:
-        """Make runs of any length and rate, split at gaps, a problem. groups: name of each run's group. start_by_group:
+        """The fit of runs of any length and rate, split at gaps. groups: name of each run's group. start_by_group:
         group -> the robot that it begins from and what is asked of it, where that is not the same in all; then every
         key of `question` is written out, and one of per_free that no group has is left out.
 

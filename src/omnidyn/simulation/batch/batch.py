@@ -118,7 +118,7 @@ class Batch:
         _check_word("command", command, (VOLTAGE, DUTY, WHEEL_SPEED))
         _check_word("dtype", _dtype_name(dtype), ("float64", "float32"))
         if supply is not None and not is_number(supply):
-            raise InputError("no supply", got=supply, expected="one number of volts, or None", where="supply")
+            raise InputError("not a supply", got=supply, expected="one number of volts, or None", where="supply")
         if not is_whole(substeps) or not 1 <= substeps <= MOST_SUBSTEPS:
             raise InputError(
                 "cannot cut a row into so many steps",
@@ -203,7 +203,7 @@ class Batch:
         chosen = np.ones(self.count, bool) if mask is None else np.asarray(mask)
         if chosen.dtype != bool or chosen.shape != (self.count,):
             raise InputError(
-                "no mask of robots",
+                "not a mask of robots",
                 got=f"{chosen.dtype}, shape {chosen.shape}",
                 expected=f"bool, shape ({self.count},)",
                 where="mask",

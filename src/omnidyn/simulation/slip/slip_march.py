@@ -115,8 +115,8 @@ def run_slipping(
 ) -> SlipOutcome:
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: a step a row.
 
-    voltage [V], bound [A]: (rows, n); state (8 + 3 n,), see `rolling`. Raises InputError where motion is so fast that
-    no patience would do.
+    voltage [V], bound [A]: (rows, n); state (8 + 3 n,), see `rolling`. Raises InputError where the motion is
+    too fast to be followed in so many steps.
     """
     rows, n = len(dt), len(plant.spin)
     pose_, states, contact = (np.zeros((rows + 1, width)) for width in (3, 8 + 3 * n, n))
