@@ -17,7 +17,7 @@ from scipy.stats import mannwhitneyu
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import time_of_row
-from omnidyn.identification.lack_of_fit import LOSS, Remedy, Outliers
+from omnidyn.identification.lack_of_fit import LOSS, Outliers, Remedy
 from omnidyn.identification.methods import NU
 from omnidyn.identification.output_error.engines.row_sums import row_terms
 from omnidyn.identification.output_error.linear.blocks import BlockProducts
