@@ -47,15 +47,15 @@ def test_a_swapped_pair_is_recognised(call, got, expected):
 @pytest.mark.parametrize(
     "call, words",
     [
-        (lambda: omnidyn.compare("axebot", RUN), "no Robot; got the text 'axebot'; expected compare.*load_robot"),
-        (lambda: omnidyn.identify("log.csv", ROBOT), "no Run or Log or .*; got the text 'log.csv'.*read_log"),
-        (lambda: omnidyn.identify([RUN, ROBOT], ROBOT), "no Run or Log or .*; got a list of Run and Robot"),
-        (lambda: omnidyn.check(None), "no Log or Run; got nothing.*recorded=True"),
+        (lambda: omnidyn.compare("axebot", RUN), "of the type Robot; got the text 'axebot'; expected compare.*load_robot"),
+        (lambda: omnidyn.identify("log.csv", ROBOT), "of the type Run or Log or .*; got the text 'log.csv'.*read_log"),
+        (lambda: omnidyn.identify([RUN, ROBOT], ROBOT), "of the type Run or Log or .*; got a list of Run and Robot"),
+        (lambda: omnidyn.check(None), "of the type Log or Run; got nothing.*recorded=True"),
         (
             lambda: omnidyn.read_log(RUN),
-            r"no str or PathLike; got a Run; expected read_log.*ready to use",
+            r"of the type str or PathLike; got a Run; expected read_log.*ready to use",
         ),
-        (lambda: omnidyn.simulate("axebot", VOLTS, 0.1), "no Robot; got the text 'axebot'"),
+        (lambda: omnidyn.simulate("axebot", VOLTS, 0.1), "of the type Robot; got the text 'axebot'"),
     ],
 )
 def test_another_kind_is_refused_with_what_makes_the_right_one(call, words):
@@ -85,7 +85,7 @@ def test_right_ones_pass_and_what_an_iterator_holds_is_not_asked():
 )
 def test_the_name_of_a_robot_is_no_robot_anywhere(call):
     """It was AttributeError: 'str' object has no attribute 'motor'."""
-    with pytest.raises(InputError, match=r"no Robot; got the text 'axebot'.*load_robot"):
+    with pytest.raises(InputError, match=r"of the type Robot; got the text 'axebot'.*load_robot"):
         call("axebot")
 
 
