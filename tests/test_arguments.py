@@ -47,7 +47,7 @@ def test_a_swapped_pair_is_recognised(call, got, expected):
 @pytest.mark.parametrize(
     "call, words",
     [
-        (lambda: omnidyn.compare("axebot", RUN), "of the type Robot; got the text 'axebot'; expected compare.*load_robot"),
+        (lambda: omnidyn.compare("axebot", RUN), "type Robot; got the text 'axebot'; expected compare.*load_robot"),
         (lambda: omnidyn.identify("log.csv", ROBOT), "of the type Run or Log or .*; got the text 'log.csv'.*read_log"),
         (lambda: omnidyn.identify([RUN, ROBOT], ROBOT), "of the type Run or Log or .*; got a list of Run and Robot"),
         (lambda: omnidyn.check(None), "of the type Log or Run; got nothing.*recorded=True"),

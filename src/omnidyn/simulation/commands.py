@@ -58,6 +58,7 @@ def commands(
         "twist_command": twist_command,
     }
     name = only_command(inputs, dt)
+    assert dt is not None
     width = 3 if name == "twist_command" else robot.wheels.count
     rows = as_floats(name, inputs[name])
     if rows.ndim != 2 or rows.shape[1] != width or not len(rows):

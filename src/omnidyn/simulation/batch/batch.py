@@ -76,6 +76,7 @@ def simulate_batch(
     """
     given = {VOLTAGE: voltage, DUTY: duty, WHEEL_SPEED: wheel_speed_command}
     name = only_command(given, dt)
+    assert dt is not None
     batch = Batch(
         robots,
         dt,
