@@ -7,6 +7,7 @@ import pytest
 
 import omnidyn
 from omnidyn.arguments import check_order, seed_of
+from omnidyn.control.feedforward import check_dt
 from omnidyn.errors import InputError
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moving_axes
 from omnidyn.run import Run
@@ -104,3 +105,12 @@ def test_random_numbers_come_from_a_seed_or_a_generator():
     for wrong in (-1, 1.5, "one", True):
         with pytest.raises(InputError, match=r"rng: not a source of random numbers.*expected a whole number"):
             seed_of(wrong)
+
+
+def test_numbers_of_numpy_count_and_truths_do_not():
+    assert omnidyn.OutputError(bootstrap=np.int64(5), tick_rad=np.float32(0.5)).bootstrap == 5
+    for options in ({"bootstrap": True}, {"tick_rad": True}):
+        with pytest.raises(InputError, match="got True"):
+            omnidyn.OutputError(**options)
+    with pytest.raises(InputError, match="dt: step out of range; got True"):
+        check_dt(True)
