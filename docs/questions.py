@@ -81,7 +81,7 @@ def found(index: dict[str, Any], typed: str) -> list[str]:
     from sphinx.search.en import SearchEnglish
 
     english, scores = SearchEnglish({}), []
-    plain = [word for word in english.split(typed.lower()) if word not in english.stopwords]
+    plain = [word for word in english.split(typed.lower()) if word not in english.stopwords and not word.isdecimal()]
     for k, page in enumerate(index["docnames"]):
         total = 0
         for word in plain:

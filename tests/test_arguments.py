@@ -1,4 +1,4 @@
-"""Arguments in each other's place: both are named, in one sentence."""
+"""Arguments that are swapped: both are named, in one sentence."""
 
 from pathlib import Path
 
@@ -7,6 +7,7 @@ import pytest
 
 import omnidyn
 from omnidyn.arguments import check_order, seed_of
+from omnidyn.control.feedforward import check_dt
 from omnidyn.errors import InputError
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moving_axes
 from omnidyn.run import Run
@@ -40,22 +41,22 @@ TABLE = omnidyn.read_steady_table(Path(__file__).resolve().parents[1] / "example
     ],
 )
 def test_a_swapped_pair_is_recognised(call, got, expected):
-    with pytest.raises(InputError, match=f"each other's place; got {got}; expected .*{expected}"):
+    with pytest.raises(InputError, match=f"arguments swapped; got {got}; expected .*{expected}"):
         call()
 
 
 @pytest.mark.parametrize(
     "call, words",
     [
-        (lambda: omnidyn.compare("axebot", RUN), "no Robot; got the text 'axebot'; expected compare.*load_robot"),
-        (lambda: omnidyn.identify("log.csv", ROBOT), "no Run or Log or .*; got the text 'log.csv'.*read_log"),
-        (lambda: omnidyn.identify([RUN, ROBOT], ROBOT), "no Run or Log or .*; got a list of Run and Robot"),
-        (lambda: omnidyn.check(None), "no Log or Run; got nothing.*recorded=True"),
+        (lambda: omnidyn.compare("axebot", RUN), "type Robot; got the text 'axebot'; expected compare.*load_robot"),
+        (lambda: omnidyn.identify("log.csv", ROBOT), "of the type Run or Log or .*; got the text 'log.csv'.*read_log"),
+        (lambda: omnidyn.identify([RUN, ROBOT], ROBOT), "of the type Run or Log or .*; got a list of Run and Robot"),
+        (lambda: omnidyn.check(None), "of the type Log or Run; got nothing.*recorded=True"),
         (
             lambda: omnidyn.read_log(RUN),
-            r"no str or PathLike; got a Run; expected read_log.*ready to use",
+            r"of the type str or PathLike; got a Run; expected read_log.*ready to use",
         ),
-        (lambda: omnidyn.simulate("axebot", VOLTS, 0.1), "no Robot; got the text 'axebot'"),
+        (lambda: omnidyn.simulate("axebot", VOLTS, 0.1), "of the type Robot; got the text 'axebot'"),
     ],
 )
 def test_another_kind_is_refused_with_what_makes_the_right_one(call, words):
@@ -85,7 +86,7 @@ def test_right_ones_pass_and_what_an_iterator_holds_is_not_asked():
 )
 def test_the_name_of_a_robot_is_no_robot_anywhere(call):
     """It was AttributeError: 'str' object has no attribute 'motor'."""
-    with pytest.raises(InputError, match=r"no Robot; got the text 'axebot'.*load_robot"):
+    with pytest.raises(InputError, match=r"of the type Robot; got the text 'axebot'.*load_robot"):
         call("axebot")
 
 
@@ -102,5 +103,14 @@ def test_random_numbers_come_from_a_seed_or_a_generator():
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
     for wrong in (-1, 1.5, "one", True):
-        with pytest.raises(InputError, match=r"rng: no source of random numbers.*expected a whole number"):
+        with pytest.raises(InputError, match=r"rng: not a source of random numbers.*expected a whole number"):
             seed_of(wrong)
+
+
+def test_numbers_of_numpy_count_and_truths_do_not():
+    assert omnidyn.OutputError(bootstrap=np.int64(5), tick_rad=np.float32(0.5)).bootstrap == 5
+    for options in ({"bootstrap": True}, {"tick_rad": True}):
+        with pytest.raises(InputError, match="got True"):
+            omnidyn.OutputError(**options)
+    with pytest.raises(InputError, match="dt: step out of range; got True"):
+        check_dt(True)

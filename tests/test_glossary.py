@@ -1,7 +1,29 @@
 """Words of the trade are explained where they occur, and nowhere else."""
 
+import ast
+from pathlib import Path
+
+import omnidyn
 from omnidyn.document import Document, Table
-from omnidyn.glossary import explained
+from omnidyn.glossary import GLOSSARY, explained
+
+PACKAGE = Path(omnidyn.__file__).parent
+
+
+def texts():
+    """All text of the package that is not documentation: what results may say."""
+    for path in PACKAGE.rglob("*.py"):
+        if path.name != "glossary.py":
+            nodes = list(ast.walk(ast.parse(path.read_text("utf-8"))))
+            docs = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+            for node in nodes:
+                if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs:
+                    yield node.value
+
+
+def test_every_word_occurs_in_what_results_say():
+    said = {line.partition(":")[0] for text in texts() for line in explained(text)}
+    assert said == set(GLOSSARY)
 
 
 def test_only_what_occurs_is_explained():

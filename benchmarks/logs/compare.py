@@ -13,9 +13,9 @@ from omnidyn.comparison.compare import compare
 from omnidyn.comparison.result import Comparison
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
-from omnidyn.paper.voltage_programs import prbs
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.prbs import prbs
 
 LOGS, MORE, ROWS, DT = scaled(400, 4), scaled(900, 4), 400, 0.01
 SPEED_NOISE, WHEEL_NOISE, POSE_NOISE = np.array([0.01, 0.01, 0.05]), 0.3, np.array([2e-3, 2e-3, 5e-3])

@@ -1,15 +1,14 @@
-"""Arguments in each other's place, or of another kind: said in one sentence, before anything fails further inside."""
+"""Arguments that are swapped, or of another kind: said in one sentence, before anything fails further inside."""
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Iterable, Iterator
 from numbers import Integral, Real
 
 import numpy as np
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, did_you_mean
 
 # What to call instead, by the name of the type that is wanted.
 MADE_BY = {
@@ -54,7 +53,7 @@ def seed_of(rng: Rng) -> int:
     if rng is None or isinstance(rng, np.random.Generator | np.random.SeedSequence):
         return int(np.random.default_rng(rng).integers(2**32))
     raise InputError(
-        "no source of random numbers",
+        "not a source of random numbers",
         got=rng,
         expected="a whole number, 0 or more, or a numpy.random.Generator",
         where="rng",
@@ -62,7 +61,7 @@ def seed_of(rng: Rng) -> int:
 
 
 def check_order(call: str, *places: tuple[object, Kinds]) -> None:
-    """Refuse arguments that stand in each other's place, and those of a wrong kind.
+    """Refuse arguments that are swapped, and those of a wrong kind.
 
     call: as it is written, "compare(robot, run)". places: (what was given, what belongs there) of each argument, in
     that order; a list stands for what it holds, an empty one for anything.
@@ -76,7 +75,7 @@ def check_order(call: str, *places: tuple[object, Kinds]) -> None:
             if position != place and _is(places[place][0], kind) and _is(places[position][0], places[place][1]):
                 first, second = sorted((place, position))
                 raise InputError(
-                    "two arguments stand in each other's place",
+                    "arguments swapped",
                     got=f"{_kind(places[first][0])} before {_kind(places[second][0])}",
                     expected=call,
                 )
@@ -84,7 +83,7 @@ def check_order(call: str, *places: tuple[object, Kinds]) -> None:
     kinds = kind if isinstance(kind, tuple) else (kind,)
     names = [kind.__name__ for kind in kinds if kind is not type(None)]
     raise InputError(
-        f"an argument is no {' or '.join(names)}",
+        f"an argument is not of the type {' or '.join(names)}",
         got=_kind(value),
         expected=call,
         remedy=next((MADE_BY[name] for name in names if name in MADE_BY), ""),
@@ -93,12 +92,11 @@ def check_order(call: str, *places: tuple[object, Kinds]) -> None:
 
 def unknown_option(owner: str, option: str, options: Iterable[str], where: str) -> InputError:
     """The error of an option that something does not have, with the nearest that it has."""
-    matches = difflib.get_close_matches(option, list(options), 1, 0.4)
     return InputError(
         f"{owner} has no such option",
         got=option,
         expected=", ".join(options),
-        remedy=f"did you mean {matches[0]}?" if matches else "",
+        remedy=did_you_mean(option, options),
         where=where,
     )
 

@@ -12,7 +12,11 @@ A message has four parts: what is wrong, what was got, what was expected, what t
 
 from __future__ import annotations
 
+import difflib
 import unicodedata
+from collections.abc import Iterable
+
+LEAST_LIKENESS = 0.5  # of a name and the one that is proposed for it: 1 for equal ones
 
 
 class OmnidynError(Exception):
@@ -43,6 +47,12 @@ class OmnidynError(Exception):
         """The same error with the place put in front, such as a file name."""
         place = f"{where}: {self.where}" if self.where else where
         return type(self)(self.what, got=self.got or None, expected=self.expected, remedy=self.remedy, where=place)
+
+
+def did_you_mean(name: str, names: Iterable[str], otherwise: str = "") -> str:
+    """The remedy for a name that is none of `names`: the nearest of them, or `otherwise` where none is like it."""
+    matches = difflib.get_close_matches(name, list(names), n=1, cutoff=LEAST_LIKENESS)
+    return f"did you mean {matches[0]}?" if matches else otherwise
 
 
 class InputError(OmnidynError):

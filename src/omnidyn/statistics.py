@@ -1,6 +1,6 @@
 """Estimates and their errors, each once: spread, stretches, quantiles, memory, bootstrap, Huber, errors in variables.
 
-What a few wild values must not move is a median or Huber's; what neighbours remember is in every standard error.
+What a few outliers must not move is a median or Huber's; the correlation of neighbours is in every standard error.
 """
 
 from __future__ import annotations

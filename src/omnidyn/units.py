@@ -7,12 +7,11 @@ Names are case-sensitive where the field is (mA, MA).
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from typing import NamedTuple
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, did_you_mean
 
 TIME, VOLTAGE, CURRENT, DUTY = "time", "voltage", "current", "duty"
 LENGTH, SPEED, ANGLE, TURN_RATE = "length", "speed", "angle", "turn rate"
@@ -153,12 +152,11 @@ def parse_unit(text: str) -> Unit:
         clean = text.strip()
         match = _UNIT.fullmatch(clean) if len(clean) <= MAX_TEXT else None
         name = _usual(match[2].strip()) if match else clean[:MAX_TEXT]
-        matches = difflib.get_close_matches(name, [*_NAMES, *_SPELLINGS], n=1, cutoff=0.5)
         raise InputError(
             "unknown unit",
             got=text,
             expected="a unit such as rad/s, rpm, mA or ticks/2000",
-            remedy=f"did you mean {matches[0]}?" if matches else "",
+            remedy=did_you_mean(name, [*_NAMES, *_SPELLINGS]),
         )
     return unit
 

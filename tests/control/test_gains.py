@@ -40,9 +40,9 @@ def test_no_loop_is_faster_than_its_steps_allow():
 
 
 def test_gains_out_of_range_are_refused():
-    with pytest.raises(InputError, match="faster: no speed for a loop; got nan"):
+    with pytest.raises(InputError, match="faster: not a speed for a loop; got nan"):
         check_faster(float("nan"))
-    with pytest.raises(InputError, match="integral: no share for the slow pole; got 2"):
+    with pytest.raises(InputError, match="integral: not a share for the slow pole; got 2"):
         check_integral(2)
 
 

@@ -70,7 +70,7 @@ def test_a_folder_that_exists_keeps_its_files_without_force(tmp_path):
 
 
 def test_several_files_are_no_single_text():
-    with pytest.raises(InputError, match=r"no single text.*use write\(path\)"):
+    with pytest.raises(InputError, match=r"not a single text.*use write\(path\)"):
         TWO.text  # noqa: B018
 
 

@@ -77,7 +77,7 @@ def test_what_a_method_has_no_use_for_is_refused(method, given):
 
 def test_groups_in_a_table_are_refused():
     """Its names would be taken for those of the logs, in that order."""
-    with pytest.raises(InputError, match=r"groups: groups are no table; got .*; expected .*NAME=GLOB"):
+    with pytest.raises(InputError, match=r"groups: groups are not a table; got .*; expected .*NAME=GLOB"):
         names_of_groups({"gray": "a*", "green": "b*"}, ["b.csv", "a.csv"])
 
 

@@ -65,7 +65,7 @@ FORMATS = {
     "h5": (b"\x89HDF\r\n\x1a\n\x00", "the MATLAB file is damaged or cut short; .*copy it again"),
     "mcap": (b"\x89MCAP0\r\n\x01", "the recording is damaged or cut short; got it ends .*copy it again"),
     "bag": (b"#ROSBAG V2.0\n", "no topic holds numbers that can be read; got no messages"),
-    "bag of an old version": (b"#ROSBAG V1.2\n", r"damaged or cut short; got it is no bag of version 2\.0"),
+    "bag of an old version": (b"#ROSBAG V1.2\n", r"damaged or cut short; got it is not a bag of version 2\.0"),
     "wpilog": (b"WPILOG\x00\x01", "the data log is damaged or cut short; .*copy it again"),
     "ulog": (b"ULog\x01\x125\x01", "a PX4 ULog file"),
     "xls": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", r"an old Excel \(\.xls\)"),
@@ -98,7 +98,7 @@ def test_a_format_is_refused_by_name(tmp_path, kind, name):  # 37
 def test_a_bag_of_ros_2_is_refused_by_name(tmp_path):
     path = tmp_path / "bag.csv"
     path.write_bytes(database(tmp_path))
-    with pytest.raises(InputError, match=r"an SQLite database that is no ROS 2 bag; got messages"):
+    with pytest.raises(InputError, match=r"an SQLite database that is not a ROS 2 bag; got messages"):
         read_table(path)
 
 

@@ -54,7 +54,7 @@ def test_a_log_is_no_table():
 
 
 def test_wrong_tables_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"no table of motors; got a, b; expected input,speed"):
+    with pytest.raises(InputError, match=r"not a table of motors; got a, b; expected input,speed"):
         read(tmp_path, "a,b\n1,2\n")
     with pytest.raises(InputError, match=r"names another unit; got turn/s; expected rad/s or rpm"):
         read(tmp_path, "input,speed [turn/s]\n1,2\n")

@@ -110,7 +110,7 @@ def test_wheels_of_no_dead_band_have_none():
 def test_files_that_are_no_table_are_refused(tmp_path):
     path = tmp_path / "wheels.csv"
     path.write_text("wheel,direction,gain,dead_band_rad_s,most_rad_s,missed_rad_s\n1,1,1,0,3,0\n1,1,1,0,3,0\n")
-    with pytest.raises(omnidyn.OmnidynError, match="no table of wheels"):
+    with pytest.raises(omnidyn.OmnidynError, match="not a table of wheels"):
         omnidyn.read_wheel_table(path)
     with pytest.raises(omnidyn.OmnidynError, match="wrong number of wheels"):
         omnidyn.wheel_table(driven([1.0, 2.0]), LEKIWI).command([1.0, 2.0])

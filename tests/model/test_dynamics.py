@@ -203,9 +203,9 @@ def test_a_disc_of_friction_turns_with_the_direction_of_travel():
     resting = omnidyn.state_space(robot, twist=[0.0, 0.0, 0.0])
     np.testing.assert_allclose(resting.A, viscous.A, atol=1e-5)
     np.testing.assert_array_equal(resting.voltage, np.zeros(3))
-    with pytest.raises(InputError, match=r"no operating point; got shape \(1, 3\)"):
+    with pytest.raises(InputError, match=r"not an operating point; got shape \(1, 3\)"):
         omnidyn.state_space(robot, twist=[[0.0, 0.0, 0.0]])
-    with pytest.raises(InputError, match=r"no operating point; got \[nan, 0.0, 0.0\]; expected finite numbers"):
+    with pytest.raises(InputError, match=r"not an operating point; got \[nan, 0.0, 0.0\]; expected finite numbers"):
         omnidyn.state_space(robot, twist=[np.nan, 0.0, 0.0])
 
 

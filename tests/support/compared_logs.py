@@ -3,9 +3,9 @@
 import numpy as np
 
 from omnidyn.model.robot import Robot
-from omnidyn.paper.voltage_programs import prbs
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.prbs import prbs
 
 SPEED_NOISE, WHEEL_NOISE, POSE_NOISE = np.array([0.01, 0.01, 0.05]), 0.3, np.array([2e-3, 2e-3, 5e-3])
 NOISE = {"vx": 0.01, "vy": 0.01, "omega": 0.05, "w1": 0.3, "w2": 0.3, "w3": 0.3}

@@ -36,12 +36,11 @@ CHECKED = {"page_checksum_verification": True}  # what changes while it is read 
 
 @dataclass(frozen=True)
 class Status:
-    """Shards that are there, that failed (shard -> traceback), and how many there are in all; samples likewise."""
+    """Shards that are there, that failed (shard -> traceback), how many there are in all; and all samples."""
 
     done: tuple[int, ...]
     failed: dict[int, str]
     shards: int
-    samples_done: int
     samples: int
 
     @property
@@ -217,8 +216,7 @@ class Folder:
         done = self.done(int(name[: -len(DONE)]) for name in names if name.endswith(DONE) and name[0] != ".")
         failed = {int(name[: -len(FAILED)]): "" for name in names if name.endswith(FAILED) and name[0] != "."}
         words = {shard: read_text(self.shard_path(shard, FAILED)) for shard in failed if shard not in set(done)}
-        rows = sum(stop - start for start, stop in map(manifest.rows, done))
-        return Status(done, words, manifest.shards, rows, manifest.samples)
+        return Status(done, words, manifest.shards, manifest.samples)
 
     @contextlib.contextmanager
     def locked(self, start: int, stop: int) -> Iterator[None]:

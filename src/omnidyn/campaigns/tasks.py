@@ -145,7 +145,7 @@ class LoadedSpec:
                 raise InputError(f"no [{owner}] that could be varied", got=name, where="[vary]")
             if variable.factor is not None and not self.keys[name]:
                 raise InputError(
-                    "no number of the robot file", got="a factor", expected="a range", where=f"[vary] {name}"
+                    "not a number of the robot file", got="a factor", expected="a range", where=f"[vary] {name}"
                 )
             if variable.std is not None and len(self.keys[name]) != 1:
                 raise InputError(

@@ -9,7 +9,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +17,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.comparison.start import REST, start_of
-from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
+from omnidyn.errors import InputError, InsufficientDataError, OmnidynError, did_you_mean
 from omnidyn.logs.channels import components
 from omnidyn.logs.segments import segments
 from omnidyn.model.drive import DUTY, SPEED
@@ -153,9 +152,8 @@ def choose_input(robot: Robot, run: Run, apply: str | None = None) -> str:
 def _refuse_apply(apply: str, inputs: list[str]) -> None:
     if apply in inputs:
         return
-    matches = difflib.get_close_matches(apply, inputs or INPUTS, n=1, cutoff=0.4)
     problem = "the log does not hold this input" if apply in INPUTS else "no such input"
-    remedy = f"did you mean {matches[0]}?" if matches else ""
+    remedy = did_you_mean(apply, inputs or INPUTS)
     raise InputError(problem, got=apply, expected=" or ".join(inputs or INPUTS), remedy=remedy, where="apply")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import operator
 import re
 from collections.abc import Sequence
@@ -10,7 +9,7 @@ from typing import NamedTuple
 
 from omnidyn.comparison.metrics import METRICS
 from omnidyn.comparison.result import Comparison
-from omnidyn.errors import InputError, InsufficientDataError, ThresholdError
+from omnidyn.errors import InputError, InsufficientDataError, ThresholdError, did_you_mean
 from omnidyn.logs.channels import place
 
 _OPERATORS = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
@@ -88,6 +87,4 @@ def refuse_exceeded(comparison: Comparison, thresholds: Sequence[Threshold]) -> 
 
 
 def _unknown(problem: str, name: str, names: Sequence[str], where: str = "`fail_if`") -> InputError:
-    matches = difflib.get_close_matches(name, names, n=1, cutoff=0.3)
-    remedy = f"did you mean {matches[0]}?" if matches else ""
-    return InputError(problem, got=name, expected=", ".join(names), remedy=remedy, where=where)
+    return InputError(problem, got=name, expected=", ".join(names), remedy=did_you_mean(name, names), where=where)

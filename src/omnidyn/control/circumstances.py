@@ -69,7 +69,7 @@ class Circumstances:
                 raise InputError("out of range", got=value, expected=f"{low:g} to {high:g}", where=name)
         if self.sensors is not None and not self.sensors.jitter <= MOST_JITTER * self.dt:
             raise InputError(
-                "the jitter is no part of a step",
+                "the jitter is not a part of a step",
                 got=f"{self.sensors.jitter:g} s",
                 expected=f"at most {MOST_JITTER * self.dt:g} s, half of dt",
                 where="sensors",
@@ -103,6 +103,6 @@ def circumstances(
             raise unknown_option("a closed loop", name, allowed, "track")
     delay, kit = options.get("delay", 0), instruments(options.pop("sensors", None), plant)
     if not 0 <= delay <= MOST_DELAY or delay != int(delay):
-        raise InputError("no delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
+        raise InputError("not a delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
     options |= {"delay": int(delay), "seed": seed_of(options.pop("rng", 0))}
     return Circumstances(**options, sensors=kit)

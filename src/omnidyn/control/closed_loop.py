@@ -100,7 +100,7 @@ def _controller(wanted: Any, robot: Robot, options: Mapping[str, Any]) -> Contro
         return wanted.make(robot, **options)
     if not hasattr(wanted, "step"):
         raise InputError(
-            "no controller",
+            "not a controller",
             got=type(wanted).__name__,
             expected="a Controller, the name of one, or a list of them",
             remedy='controller="pid", or one made for the robot, such as Mpc(robot)',

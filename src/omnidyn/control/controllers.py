@@ -13,7 +13,6 @@ An option is a keyword argument of the controller; those of a file come before t
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import inspect
 import math
@@ -25,7 +24,7 @@ from typing import Any, get_args, get_type_hints
 
 from omnidyn.arguments import unknown_option
 from omnidyn.control.controller import Controller
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, did_you_mean
 from omnidyn.files import parse_toml, read_text, write_atomic
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import toml_literal
@@ -80,12 +79,11 @@ def controller_class(name: str) -> type[Any]:
     """The class of a controller. Raises InputError for a name that none has."""
     places = NAMES | UNLISTED_NAMES
     if name not in places:
-        matches = difflib.get_close_matches(name, places, 1)
         raise InputError(
             "unknown controller",
             got=name,
             expected=f"{', '.join(places)}, or a controller file (.toml, .npz)",
-            remedy=f"did you mean {matches[0]}?" if matches else "",
+            remedy=did_you_mean(name, places),
             where="controller",
         )
     module, _, class_name = places[name].partition(":")
@@ -227,12 +225,11 @@ def load_controller(path: str | os.PathLike) -> ControllerFile:
     keys = ("schema", "controller", "source", "options")
     for key in table:
         if key not in keys:
-            matches = difflib.get_close_matches(key, keys, 1, 0.4)
             raise InputError(
                 "unknown key",
                 got=key,
                 expected=", ".join(keys),
-                remedy=f"did you mean {matches[0]}?" if matches else "",
+                remedy=did_you_mean(key, keys),
                 where=file_name,
             )
     if table.get("schema") != SCHEMA:

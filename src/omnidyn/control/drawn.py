@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,10 +56,10 @@ def smoothed(path: Polyline, width: float, *, closed: bool = False) -> Polyline:
     return lines(t, np.column_stack(mean), path.name)
 
 
-def least_smoothing(robot: Robot, path: Polyline, *, closed: bool = False, widths: Sequence[float] = WIDTHS) -> float:
-    """The first of these windows [s] with which the robot can follow the path; the last one where it cannot."""
-    for width in widths:
+def least_smoothing(robot: Robot, path: Polyline, *, closed: bool = False) -> float:
+    """The first of the windows WIDTHS [s] with which the robot can follow the path; the last one where it cannot."""
+    for width in WIDTHS:
         made = smoothed(path, width, closed=closed)
         if path_demand(robot, Smooth(made.name, made.t, made.pose)).follows:
             return width
-    return widths[-1]
+    return WIDTHS[-1]

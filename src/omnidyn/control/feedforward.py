@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
-from omnidyn.arguments import check_order
+from omnidyn.arguments import check_order, is_number
 from omnidyn.arrays import FloatArray, product
 from omnidyn.control.controller import WHEEL_SPEED, Guarded, output_limit
 from omnidyn.control.paths.motion import Path
@@ -236,7 +236,7 @@ def _fade(model: Inverse, dt: float) -> FloatArray:
 
 def check_dt(dt: float) -> float:
     """The time between two steps [s]. Raises InputError outside 1e-5..10 s."""
-    if not isinstance(dt, int | float) or not SHORTEST_STEP <= dt <= LONGEST_STEP:
+    if not is_number(dt) or not SHORTEST_STEP <= dt <= LONGEST_STEP:
         raise InputError("step out of range", got=dt, expected=f"{SHORTEST_STEP:g} to {LONGEST_STEP:g} s", where="dt")
     return float(dt)
 
@@ -244,7 +244,7 @@ def check_dt(dt: float) -> float:
 def check_delay(delay: int | None) -> int | None:
     """Steps until an output acts. Raises InputError outside 0..100."""
     if delay is not None and (isinstance(delay, bool) or delay != int(delay) or not 0 <= delay <= MOST_DELAY):
-        raise InputError("no delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
+        raise InputError("not a delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
     return delay
 
 

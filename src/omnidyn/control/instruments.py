@@ -11,14 +11,13 @@ late, with so much noise), `dropouts` (samples lost), `jitter` (of the time betw
 
 from __future__ import annotations
 
-import difflib
 import re
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, did_you_mean
 from omnidyn.model.log_effects import (
     FASTEST,
     INSTANTANEOUS,
@@ -125,7 +124,7 @@ def instruments(wanted: str | Instruments | Sensors | None, robot: Robot) -> Ins
         return Instruments(wanted)
     if not isinstance(wanted, str):
         raise InputError(
-            "no sensors", got=type(wanted).__name__, expected='a text such as "encoder:2048"', where="sensors"
+            "not sensors", got=type(wanted).__name__, expected='a text such as "encoder:2048"', where="sensors"
         )
     return _read(wanted)
 
@@ -162,8 +161,7 @@ def _check_word(word: str, words: list[str]) -> None:
     if word in words:
         raise _unreadable(word, "each part once")
     if word not in PARTS:
-        matches = difflib.get_close_matches(word, PARTS, 1, 0.4)
-        raise _unreadable(word or "nothing", ", ".join(PARTS), f"did you mean {matches[0]}?" if matches else "")
+        raise _unreadable(word or "nothing", ", ".join(PARTS), did_you_mean(word, PARTS))
 
 
 def _value(word: str, text: str) -> tuple[str, float]:

@@ -96,7 +96,7 @@ def check_faster(faster: float) -> float:
     """How many times as fast as the robot. Raises InputError outside 0.05..1000."""
     if not isinstance(faster, int | float) or not 0.05 <= faster <= MOST_FASTER:
         raise InputError(
-            "no speed for a loop",
+            "not a speed for a loop",
             got=faster,
             expected=f"0.05 to {MOST_FASTER:g} times that of the robot",
             where="faster",
@@ -108,6 +108,6 @@ def check_integral(integral: float) -> float:
     """The share of the slow pole. Raises InputError outside 0..1."""
     if not isinstance(integral, int | float) or not 0.0 <= integral <= 1.0:
         raise InputError(
-            "no share for the slow pole", got=integral, expected="0 (no sum of errors) to 1", where="integral"
+            "not a share for the slow pole", got=integral, expected="0 (no sum of errors) to 1", where="integral"
         )
     return float(integral)

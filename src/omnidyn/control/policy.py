@@ -50,7 +50,7 @@ class PolicyFile:
             raise InputError("unknown task", got=self.task, expected=", ".join(TASKS), where="task")
         check_dt(self.dt)
         if not 1 <= len(self.layers) <= MOST_LAYERS:
-            raise InputError("no network", got=f"{len(self.layers)} layers", expected=f"1 to {MOST_LAYERS}")
+            raise InputError("not a network", got=f"{len(self.layers)} layers", expected=f"1 to {MOST_LAYERS}")
         columns = None
         for k, (weight, bias) in enumerate(self.layers):
             fits = weight.ndim == 2 and bias.shape == weight.shape[:1] and columns in (None, weight.shape[-1])
@@ -82,7 +82,7 @@ def policy_of(layers: Layers, task: str, dt: float = DT) -> PolicyFile:
     try:
         arrays = tuple((np.array(weight, dtype=float), np.array(bias, dtype=float)) for weight, bias in layers)
     except (TypeError, ValueError):
-        raise InputError("no network", got=type(layers).__name__, expected="(W, b) of each layer") from None
+        raise InputError("not a network", got=type(layers).__name__, expected="(W, b) of each layer") from None
     return PolicyFile(arrays, task, dt)
 
 

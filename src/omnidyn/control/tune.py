@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
-from omnidyn.arguments import check_order
+from omnidyn.arguments import check_order, is_whole
 from omnidyn.control.circumstances import Circumstances, TuneOptions, circumstances
 from omnidyn.control.closed_loop import told_of_loop, tracked
 from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
@@ -318,7 +318,7 @@ def tune(
 
 def _check_counts(draws: int, evaluations: int, paths: Any) -> None:
     for name, value, largest in (("draws", draws, MOST_DRAWS), ("evaluations", evaluations, MOST_EVALUATIONS)):
-        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= largest:
+        if not is_whole(value) or not 1 <= value <= largest:
             raise InputError("out of range", got=value, expected=f"1 to {largest}", where=name)
     if not paths:
         raise InputError("nothing to follow", got="no path", expected="a path, or several", where="path")

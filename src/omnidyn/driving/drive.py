@@ -215,7 +215,7 @@ class _Driver:
         return None
 
     def _tell(self) -> None:
-        """Who looks on hears where it is."""
+        """Calls `follow` with where the drive is."""
         channel, source = self.program.channel, self.program.source or self.program.robot.name
         moment = DriveMoment(self.rows, self.guard.odometry.place, lambda: self.recording.new_rows(channel, source))
         self.follow(moment)

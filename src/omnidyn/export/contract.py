@@ -51,7 +51,7 @@ class Export(Displayable):
         (content,) = self.files.values() if len(self.files) == 1 else (b"",)
         if isinstance(content, bytes):
             raise InputError(
-                f"{self.kind} is no single text",
+                f"{self.kind} is not a single text",
                 got=", ".join(self.files),
                 expected="a file or a folder to write to",
                 remedy="use write(path)",

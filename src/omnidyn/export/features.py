@@ -210,11 +210,9 @@ _GAINS = {
     "breakaway": Cell(LEAVES_OUT, "kS is what sliding takes; from rest the robot needs more"),
     "frame": Cell(LEAVES_OUT, "each axis for itself: driving and turning at once takes M omega v more"),
     "inductance": Cell(LEAVES_OUT, "the currents have settled"),
-    "band": Cell(
-        PARTLY, "kS makes up for it on axes whose motors all turn; a motor whose share is within it gets none"
-    ),
-    "drop": Cell(
-        PARTLY, "kS makes up for it on axes whose motors all turn; a motor whose share is within it gets none"
+    **dict.fromkeys(
+        ("band", "drop"),
+        Cell(PARTLY, "kS makes up for it on axes whose motors all turn; a motor whose share is within it gets none"),
     ),
     "current": Cell(LEAVES_OUT, "volts beyond what the current limit allows do not act"),
     "gear": Cell(LEAVES_OUT, "no gear takes anything"),
@@ -265,11 +263,8 @@ _LINKS = {
     "gear": Cell(LEAVES_OUT, "no gear takes anything"),
     "spin": Cell(PARTLY, "wheels spin about their axles; the format has no word for rotors"),
     "rollers": Cell(LEAVES_OUT, "wheels are plain discs: URDF has no direction of friction"),
-    "band": Cell(LEAVES_OUT, "there are no motors in the file"),
-    "map": Cell(LEAVES_OUT, "there are no motors in the file"),
+    **dict.fromkeys(("band", "map", "loop", "duty"), Cell(LEAVES_OUT, "there are no motors in the file")),
     "latency": Cell(LEAVES_OUT, "commands act at once"),
-    "loop": Cell(LEAVES_OUT, "there are no motors in the file"),
-    "duty": Cell(LEAVES_OUT, "there are no motors in the file"),
 }
 
 _KINEMATICS = "the controller knows kinematics only; the limits of velocity_smoother.yaml know it along each axis alone"

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     from omnidyn.export.contract import Export
@@ -57,8 +56,7 @@ def python_name(kind: str) -> str:
 def maker(kind: str) -> Callable[..., Export]:
     """The function that makes a kind of export of a robot. Raises InputError for a kind that there is not."""
     if kind not in KINDS:
-        matches = difflib.get_close_matches(kind, KINDS, n=1)
-        remedy = f"did you mean {matches[0]}?" if matches else ""
+        remedy = did_you_mean(kind, KINDS)
         raise InputError("no such kind of export", got=kind, expected=", ".join(KINDS), remedy=remedy, where="KIND")
     spec = KINDS[kind]
     return getattr(importlib.import_module(spec.module), spec.function)

@@ -72,10 +72,10 @@ def c_number(value: float, single: bool = False) -> str:
     return f"{text}f" if single else text
 
 
-def identifier(name: str, fallback: str = "robot") -> str:
+def identifier(name: str) -> str:
     """A name as an identifier of C, Java, Python, ROS, XML: small ASCII letters, digits and _, a letter first."""
     text = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:LONGEST].strip("_")
-    text = text if text and text[0].isalpha() else f"{fallback}_{text}".rstrip("_")
+    text = text if text and text[0].isalpha() else f"robot_{text}".rstrip("_")
     return f"{text}_" if text in _RESERVED_WORDS else text
 
 
@@ -84,10 +84,10 @@ def attribute(text: str) -> str:
     return quoteattr(printable(text))
 
 
-def xml_comment(lines: list[str], indent: str = "  ") -> str:
+def xml_comment(lines: list[str]) -> str:
     """Lines as one comment of XML: it holds no two dashes, and does not end with one."""
     safe = [re.sub(r"-(?=-)", "- ", printable(line)).rstrip() for line in lines]
-    inner = "\n".join(f"{indent}{line}".rstrip() for line in safe)
+    inner = "\n".join(f"  {line}".rstrip() for line in safe)
     return f"<!--\n{inner}\n-->"
 
 

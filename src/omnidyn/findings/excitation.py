@@ -39,7 +39,7 @@ def excitation(work: LogUnderCheck) -> dict[str, float]:
     """Measures of what moves, empty where no motion was recorded.
 
     time_s: length of the log. moving: share of rows in motion. x, y, yaw: root mean square speed while moving [m/s,
-    m/s, rad/s]. x_max ..: largest, wild rows left out. forward_x, backward_x ..: share of the moving rows in which the
+    m/s, rad/s]. x_max ..: largest, outliers left out. forward_x, backward_x ..: share of the moving rows in which the
     axis goes that way. directions: of 12, in which it drives. turning: share of the moving rows in which it turns.
     speeds: 90 % quantile of the speed over its 10 % quantile, while moving.
     """

@@ -32,7 +32,7 @@ from omnidyn.simulation.simulate import simulate
 ROWS, HOLD, DT = 200, 40, 0.01  # rows of a run; rows and [s] that a command holds
 NOISE = {"twist": 0.005, "current": 0.05, "pose": 0.002}  # [m/s, rad/s], [A], [m, rad]
 TWIST, VOLTAGE = (0.4, 0.4, 2.0), 10.0  # the largest commands [m/s, m/s, rad/s], [V]
-# Of errors that remember, beside noise that does not: what is left of one in the rows after it.
+# Of autocorrelated errors, beside white noise: what is left of one in the rows after it.
 MEMORY: FloatArray = 0.95 ** np.arange(80.0) + 3.0 * (np.arange(80) == 0)
 TICK = 2.0 * np.pi / 200.0  # of a counted angle [rad]
 
@@ -53,8 +53,8 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("simulation, friction of the axes", partial(_run, paper)),
         ("fit of speeds", partial(_fit, paper, "twist")),
         ("fit of speeds alone", partial(_fit, paper, "twist", nuisances=(), start="rest")),
-        ("fit of speeds whose errors remember", partial(_fit, paper, "twist", memory=MEMORY)),
-        ("errors that remember while the robot moves", _remember),
+        ("fit of speeds whose errors are autocorrelated", partial(_fit, paper, "twist", memory=MEMORY)),
+        ("autocorrelated errors while the robot moves", _remember),
         ("fit of speeds, currents and poses", partial(_fit, paper, "twist", "current", "pose")),
         ("fit of a force in the room", partial(_fit, paper, "twist", "current", "pose", nuisances=("tilt",))),
         ("fit of counted angles", partial(_fit, paper, "wheel_angle")),

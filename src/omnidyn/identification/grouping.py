@@ -71,7 +71,7 @@ def names_of_groups(groups: str | Sequence[str] | None, sources: Sequence[str]) 
     """
     if isinstance(groups, Mapping):
         raise InputError(
-            "groups are no table", got=groups, expected='["NAME=GLOB", ...] or a name for every run', where="groups"
+            "groups are not a table", got=groups, expected='["NAME=GLOB", ...] or a name for every run', where="groups"
         )
     words = [groups] if isinstance(groups, str) else list(groups or ())
     if not words:

@@ -14,7 +14,7 @@ from omnidyn.identification.stability import Stability
 from omnidyn.model.keys import in_words
 from omnidyn.statement import NOTE, WARNING, Statement, statements
 
-LOSS = "loss"  # the key of a remedy for wild samples, which is no cause of a misfit
+LOSS = "loss"  # the key of a remedy for outliers, which is no cause of a misfit
 MAIN_SHARE = 0.7  # of all that residuals hold beside noise, that a remedy must explain to be the one
 CHANGE = "change"  # the key of friction that is another one from some time of the log on
 # What robots do that no law holds yet: keys.
@@ -44,7 +44,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Wild:
+class Outliers:
     """Of an output, the samples that are far beyond its noise: their share of all, and of the squares of residuals."""
 
     share: float
@@ -182,7 +182,7 @@ class LackOfFit:
     -> what that is, root mean square, in the unit of the output. follows: what residuals follow, first what explains
     most. remedies: best first; those that the log cannot tell from each other name each other in `same_as`. tested:
     what they were tested for -> chance of as much by noise alone. pictures: of the output that is worst. wild: outputs
-    with wild samples, which is no lack of fit, but widens intervals and pulls at numbers, unless the loss is Student's;
+    with outliers, which is no lack of fit, but widens intervals and pulls at numbers, unless the loss is Student's;
     then the last remedy, key "loss", is that, whether or not there is a misfit.
     noise: of outputs whose noise the log shows without the model, by the best source; None where that was not asked.
     beyond: those whose residuals are larger, by a source that decides. at_rest: the same where the robot rests.
@@ -199,7 +199,7 @@ class LackOfFit:
     remedies: tuple[Remedy, ...]
     tested: Mapping[str, float]
     pictures: tuple[Binned, ...] = ()
-    wild: Mapping[str, Wild] = field(default_factory=dict)
+    wild: Mapping[str, Outliers] = field(default_factory=dict)
     noise: Mapping[str, Noise] | None = None
     beyond: tuple[str, ...] = ()
     at_rest: Mapping[str, Noise] = field(default_factory=dict)
@@ -271,8 +271,8 @@ class LackOfFit:
             )
             for r in self.remedies
         ]
-        head = ("what may be missing", "key", "held-out error less by", "would change", "the same to this log")
-        return Table(head, rows, "<<><<")
+        head = ("what may be missing", "key", "held-out error less by", "would change")
+        return Table((*head, "not distinguishable with this log"), rows, "<<><<")
 
     def statements(self) -> list[Statement]:
         """What was found, the gravest first."""

@@ -13,12 +13,13 @@ from dataclasses import Field, dataclass, field, fields
 from functools import cache
 from typing import Any, ClassVar, Literal, get_args, get_type_hints
 
+from omnidyn.arguments import is_number, is_whole
 from omnidyn.errors import InputError
 
 AUTO, NONE = "auto", "none"
 OUTPUT_ERROR, STEADY_STATE = "output-error", "steady-state"
 GAUSS, STUDENT = "gaussian", "student-t"
-NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
+NU = 4.0  # degrees of freedom of Student's t: 2 % of outliers hardly count, 95 % efficient without them
 REST, FREE = "rest", "free"
 LINE = "line"  # a shape: the paper's line on each axis
 HOLD_OUT, GROUPS, QUICK = "hold_out", "groups", "quick"  # what `identify` takes for some of the methods
@@ -138,14 +139,14 @@ def _shares(window: Any) -> tuple[float, float] | None:
 
 def _draws(count: Any) -> int:
     """A number of draws. Raises InputError for what is none."""
-    if isinstance(count, bool) or not isinstance(count, int) or count < 0:
+    if not is_whole(count) or count < 0:
         raise InputError("not a number of draws", got=count, expected="0 or a whole number above it", where="bootstrap")
-    return count
+    return int(count)
 
 
 def _tick(size: Any) -> float | None:
     """The step of an encoder [rad], None where the log tells it. Raises InputError for what is no size."""
-    if size is not None and (not isinstance(size, int | float) or not 0.0 <= size < math.inf):
+    if size is not None and (not is_number(size) or not 0.0 <= size < math.inf):
         raise InputError("not the step of an encoder", got=size, expected="0 rad or more, or None", where="tick_rad")
     return size
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.arguments import is_number
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.interop.dataset import TIME
@@ -74,6 +75,4 @@ def _numbers(name: str, values: Any) -> FloatArray:
 
 
 def _only_missing_and_numbers(values: Any) -> bool:
-    return values.dtype.kind == "O" and all(
-        value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values.ravel()
-    )
+    return values.dtype.kind == "O" and all(value is None or is_number(value) for value in values.ravel())

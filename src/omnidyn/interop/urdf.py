@@ -126,7 +126,7 @@ def _frames(links: dict[str, ET.Element], joints: list[ET.Element]) -> dict[str,
         if name not in parents:
             frames[name] = np.zeros(3), np.eye(3)
     if len(frames) != 1:
-        raise InputError("the joints are no tree", got=f"{len(frames)} links without a parent", expected="one")
+        raise InputError("the joints are not a tree", got=f"{len(frames)} links without a parent", expected="one")
     for _ in range(DEEPEST):
         for name, joint in parents.items():
             parent = joint.find("parent")
@@ -137,7 +137,7 @@ def _frames(links: dict[str, ET.Element], joints: list[ET.Element]) -> dict[str,
     if len(frames) < len(links):
         unreached = ", ".join(name for name in links if name not in frames)
         raise InputError(
-            "the joints are no tree", got=f"no way from the root to {unreached}", expected="one to every link"
+            "the joints are not a tree", got=f"no way from the root to {unreached}", expected="one to every link"
         )
     return frames
 

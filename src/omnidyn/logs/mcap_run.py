@@ -90,7 +90,7 @@ def stamps_of(run: Run) -> IntArray:
     """Times as whole ns. Raises InputError where they are none: before 0, too late, or less than 1 ns apart."""
     if not 0.0 <= run.t[0] <= run.t[-1] < LARGEST_NS / 1e9:
         raise InputError(
-            "these times are no stamps",
+            "these times are not time stamps",
             got=f"{run.t[0]:.9g} to {run.t[-1]:.9g} s",
             expected="seconds from 0 on",
             remedy="shift them: run.replace(t=run.t - run.t[0])",

@@ -98,7 +98,7 @@ def read_motor_table(path: str | os.PathLike) -> MotorTable:
     columns = {_bare(name): name for name in table.names}
     if not is_motor_table(table.names):
         raise InputError(
-            "no table of motors",
+            "not a table of motors",
             got=", ".join(table.names),
             expected="input,speed[,motor]",
             remedy="name the columns so, or voltage_V, duty_%, speed_rpm",

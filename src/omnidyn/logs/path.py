@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.errors import InputError
 from omnidyn.logs.segments import filled, segments
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
@@ -60,6 +61,19 @@ def path_of(run: Run, robot: Robot | None = None) -> BodyPath | None:
     world = _turned(middle[:, :2], 0.5 * (heading[1:] + heading[:-1]))
     position = np.vstack([np.zeros(2), np.cumsum(world, axis=0)])
     return BodyPath(position, middle[:, :2], origin, heading)
+
+
+def drawable_path(run: Run, robot: Robot | None = None) -> BodyPath:
+    """`path_of` a run that is to be drawn. Raises InputError for a run that does not say where it went."""
+    path = path_of(run, robot)
+    if path is None:
+        raise InputError(
+            "where it went is not in the run",
+            got=", ".join(run.channels),
+            expected="pose, twist, or the wheel speeds of a robot that is given",
+            where="run",
+        )
+    return path
 
 
 def body_twist(run: Run, robot: Robot | None = None) -> FloatArray | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,7 +12,7 @@ import numpy as np
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.clocks import is_staggered
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, did_you_mean
 from omnidyn.logs.channels import TIME, components, place
 from omnidyn.logs.clock.clock import Clock
 from omnidyn.logs.clock.counted_columns import Counters
@@ -199,13 +198,11 @@ def map_columns(table: FileTable, robot: Robot | None, options: LogOptions) -> C
     columns = with_frames(columns, options.assume)
     for component, column in columns.columns.items():
         if column.name not in table.names:
-            matches = difflib.get_close_matches(column.name, table.names, n=1, cutoff=0.5)
-            remedy = f'did you mean "{matches[0]}"?' if matches else ""
             raise InputError(
                 f"the log has no column {column.name} for {component}",
                 got=", ".join(table.names),
                 expected="one of its columns",
-                remedy=remedy,
+                remedy=did_you_mean(f'"{column.name}"', [f'"{name}"' for name in table.names]),
                 where=table.source,
             )
     refuse_doubtful(columns, table)

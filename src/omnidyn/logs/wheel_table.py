@@ -64,7 +64,7 @@ class WheelTable(Displayable):
             (wheel, direction) for wheel in wheels for direction in (1, -1)
         ]:
             raise InputError(
-                "no table of wheels",
+                "not a table of wheels",
                 got=f"{len(self.lines)} rows",
                 expected="two rows for each wheel, 1 and on, direction 1 and -1",
                 remedy="write it with `wheel_table`",
@@ -86,7 +86,7 @@ class WheelTable(Displayable):
             )
         if not 0.0 <= line.dead_band < line.most < np.inf or not 0.0 <= line.missed < np.inf:
             raise InputError(
-                "no speeds of a wheel",
+                "not the speeds of a wheel",
                 got=f"dead band {line.dead_band:g}, asked up to {line.most:g}, missed {line.missed:g} of {place}",
                 expected="rad/s, 0 or more, the dead band below the largest that was asked for",
                 remedy="write the table again with `wheel_table`",

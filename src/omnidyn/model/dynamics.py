@@ -291,9 +291,9 @@ ASIDE = 1e-6  # [m/s, rad/s] by which an axis at rest is moved, so that its fric
 def _at_operating_point(robot: Robot, twist: FloatArray) -> StateSpace:
     """Central differences of `acceleration`, on one side of every jump; the voltage of least squares that holds it."""
     if twist.shape != (3,):
-        raise InputError("no operating point", got=f"shape {twist.shape}", expected="(3,): vx, vy, omega")
+        raise InputError("not an operating point", got=f"shape {twist.shape}", expected="(3,): vx, vy, omega")
     if not np.isfinite(twist).all():
-        raise InputError("no operating point", got=twist.tolist(), expected="finite numbers", where="twist")
+        raise InputError("not an operating point", got=twist.tolist(), expected="finite numbers", where="twist")
     friction, still = robot.friction, not twist[:2].any()
     if still:  # its direction is open, and so is that of its friction
         bare = friction.direction.replace(coulomb=(0.0, 0.0), breakaway=None)

@@ -56,14 +56,12 @@ class Inverse:
         about = np.where(np.abs(about) <= slight * fastest, 0.0, about)
         rests = speed == 0.0
         slide, ellipse = levels.sliding(speed, twist)
-        coulomb = resisting(levels, twist, speed, np.sign(speed), slide, twist[..., :2], ellipse)
+        coulomb = resisting(levels, speed, np.sign(speed), slide, twist[..., :2], ellipse)
         rising = np.where(rests, np.sign(about), 0.0)
         stands = np.all(twist[..., :2] == 0.0, axis=-1, keepdims=True)
         faint = np.abs(acceleration[..., :2]) <= slight * fastest
         direction = np.where(stands & ~faint, acceleration[..., :2], still)
-        return coulomb + resisting(
-            levels, 0.0 * twist, 0.0 * speed, rising, levels.hold, direction, levels.ellipse_hold
-        )
+        return coulomb + resisting(levels, 0.0 * speed, rising, levels.hold, direction, levels.ellipse_hold)
 
     def soft_friction(self, twist: FloatArray, fade: FloatArray) -> FloatArray:
         """Wrench of friction at a twist (*batch, 3), its dry part in proportion to the speed below `fade`, shape (3,).
@@ -75,7 +73,7 @@ class Inverse:
         side = np.clip(speed / np.sqrt(levels.directions**2 @ fade**2), -1.0, 1.0)
         slide, ellipse = levels.sliding(speed, twist)
         least_dissipation = float(np.sqrt(np.sum(((1.0 if levels.plain else levels.ellipse_slide) * fade[:2]) ** 2)))
-        return resisting(levels, twist, speed, side, slide, twist[..., :2], ellipse, least_dissipation)
+        return resisting(levels, speed, side, slide, twist[..., :2], ellipse, least_dissipation)
 
     def wrench(self, twist: FloatArray, acceleration: FloatArray, friction: FloatArray) -> FloatArray:
         """Wrench of the motors [N, N, N m] that a motion takes. Shapes (*batch, 3)."""

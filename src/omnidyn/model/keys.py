@@ -6,7 +6,6 @@ a key is plain text; what it means is asked here: nobody else takes one apart.
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, did_you_mean
 from omnidyn.model.friction.kinds import NUMBERS
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import Prior, Robot
@@ -374,10 +373,9 @@ def _unknown(name: str, text: str) -> InputError:
         return InputError("a table, not a number", got=text, expected=f"a number in it, such as {below[0]}")
     if table and field in keys_of(Robot, table.split(".")):
         return InputError("not a number", got=text, expected="the key of a number")
-    matches = difflib.get_close_matches(name, key_names, n=1, cutoff=0.5)
+    if remedy := did_you_mean(name, key_names):
+        return InputError("unknown key", got=text, remedy=remedy)
     table_keys = [key for key in key_names if key.startswith(f"{table}.")] or ["a key such as body.mass_kg"]
-    if matches:
-        return InputError("unknown key", got=text, remedy=f"did you mean {matches[0]}?")
     return InputError("unknown key", got=text, expected=" or ".join(table_keys))
 
 

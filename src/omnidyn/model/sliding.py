@@ -83,7 +83,7 @@ def sliding_wrench(robot: Robot, twist: ArrayLike) -> FloatArray:
     levels, twist = levels_of(robot), np.asarray(twist, dtype=float)
     speed = speeds(levels, twist)
     slide, ellipse = levels.sliding(speed, twist)
-    return resisting(levels, twist, speed, np.sign(speed), slide, twist[..., :2], ellipse)
+    return resisting(levels, speed, np.sign(speed), slide, twist[..., :2], ellipse)
 
 
 def speeds(levels: FrictionLevels, twist: FloatArray, rounding: float = ROUNDING) -> FloatArray:
@@ -94,7 +94,6 @@ def speeds(levels: FrictionLevels, twist: FloatArray, rounding: float = ROUNDING
 
 def resisting(
     levels: FrictionLevels,
-    twist: FloatArray,
     speed: FloatArray,
     side: FloatArray,
     slide: FloatArray,

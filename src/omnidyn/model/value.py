@@ -6,7 +6,6 @@ its meaning. Construction checks it, from a file or from Python, and raises Inpu
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
@@ -24,7 +23,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, did_you_mean
 
 
 class Value(BaseModel):
@@ -157,8 +156,7 @@ def key_path(path: list[Any] | tuple[Any, ...]) -> str:
 def _nearest(path: list[Any], model: type[BaseModel]) -> str:
     """The known keys at the place of an unknown one, the nearest name first."""
     keys = sorted(keys_of(model, path[:-1]))
-    matches = difflib.get_close_matches(str(path[-1]), keys, n=1, cutoff=0.5)
-    return f"did you mean {matches[0]}?" if matches else f"known keys: {', '.join(keys)}"
+    return did_you_mean(str(path[-1]), keys, f"known keys: {', '.join(keys)}")
 
 
 def table_at(model: type[BaseModel], path: Sequence[Any]) -> type[BaseModel] | None:

@@ -74,8 +74,8 @@ class Variations(Value):
             strange = [name for name in getattr(self, kind) if not _NAME.fullmatch(name)]
             if strange:
                 raise ValueError(
-                    f"[variations.{kind}] {strange[0]!r} is no name that can be asked for; expected letters, digits, - "
-                    "and _"
+                    f"[variations.{kind}] {strange[0]!r} is not a name that can be asked for; expected letters, "
+                    "digits, - and _"
                 )
         return self
 

@@ -5,7 +5,6 @@ A robot like any other, with a name that says what was changed.
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, did_you_mean
 from omnidyn.model.correlation import KeyCorrelation, key_correlation
 from omnidyn.model.friction import Friction
 from omnidyn.model.keys import BREAKAWAY, COULOMB, VISCOUS
@@ -122,8 +121,7 @@ def _of_kind(kind: str, value: Any) -> Any:
 
 
 def _nearest(name: str, names: Sequence[str]) -> str:
-    matches = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    return f"did you mean {matches[0]}?" if matches else f"known names: {', '.join(names)}"
+    return did_you_mean(name, names, f"known names: {', '.join(names)}")
 
 
 def _priors_of(robot: Robot, kind: str, choice: object) -> dict[str, Prior]:

@@ -19,14 +19,6 @@ def ramp(pattern: ArrayLike, peak: float, duration: float, dt: float) -> FloatAr
     return np.outer(np.linspace(0.0, peak, _count(duration, dt)), np.asarray(pattern, dtype=float))
 
 
-def prbs(amplitude: ArrayLike, clock: float, duration: float, dt: float, seed: int) -> FloatArray:
-    """Pseudo-random two-level signal: each wheel draws +-`amplitude` [V], shape (wheels,), anew every `clock` [s]."""
-    amplitude = np.atleast_1d(np.asarray(amplitude, dtype=float))
-    n, hold = _count(duration, dt), _count(clock, dt)
-    signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(-(-n // hold), len(amplitude)))
-    return np.repeat(signs * amplitude, hold, axis=0)[:n]
-
-
 def _count(duration: float, dt: float) -> int:
     """Number of steps of `dt` in `duration`, at least one."""
     if not (np.isfinite(duration) and np.isfinite(dt) and duration > 0.0 and dt > 0.0):

@@ -26,7 +26,7 @@ def draw_misfit(pictures: Sequence[Binned], name: str = "misfit") -> Picture:
         first = pictures[0]
         figure.supylabel(f"residual of {first.output} [{first.unit}]", fontsize=11.0)
         caption = (
-            f"Mean residual of {first.output}, the output that holds most that is no noise, with two standard errors "
+            f"Mean residual of {first.output}, the output that holds most that is not noise, with two standard errors "
             "(as of white noise). A model that is right leaves points about 0 in every panel; a curve is what it "
             "leaves out."
         )

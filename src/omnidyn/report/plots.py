@@ -20,7 +20,7 @@ from omnidyn.identification.identification import Identification
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.identification.planning.planned import Plan
 from omnidyn.identification.steady.study_table import SteadyStudy
-from omnidyn.logs.path import path_of
+from omnidyn.logs.path import drawable_path
 from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds
@@ -62,15 +62,7 @@ def _robot(robot: Robot, what: str) -> Picture:
 def _run(run: Run, channels: Sequence[str] = (), path: bool = False, robot: Robot | None = None) -> Picture:
     if not path:
         return draw_run(run, channels)
-    went = path_of(run, robot)
-    if went is None:
-        raise InputError(
-            "where it went is not in the run",
-            got=", ".join(run.channels),
-            expected="twist or pose",
-            remedy="or wheel speeds and the robot: plot_path(robot)",
-        )
-    return draw_path([went])
+    return draw_path([drawable_path(run, robot)])
 
 
 def _verdict(verdict: Verdict) -> Picture:

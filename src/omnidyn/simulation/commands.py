@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -56,14 +57,9 @@ def commands(
         "wheel_speed_command": wheel_speed_command,
         "twist_command": twist_command,
     }
-    given_names = [name for name, value in inputs.items() if value is not None]
-    if len(given_names) != 1 or dt is None:
-        raise InputError(
-            "cannot tell what to apply",
-            got=" and ".join(given_names) or "no command",
-            expected=f"one of {', '.join(inputs)}, and dt",
-        )
-    name, width = given_names[0], 3 if given_names[0] == "twist_command" else robot.wheels.count
+    name = only_command(inputs, dt)
+    assert dt is not None
+    width = 3 if name == "twist_command" else robot.wheels.count
     rows = as_floats(name, inputs[name])
     if rows.ndim != 2 or rows.shape[1] != width or not len(rows):
         raise InputError("wrong shape", got=rows.shape, expected=f"(n, {width}), n >= 1", where=name)
@@ -88,6 +84,18 @@ def commands(
     if name == "twist_command":
         return Commands(steps, None, set_point=wheel_speed(robot.wheels, rows), twist=rows)
     return Commands(steps, None, set_point=rows)
+
+
+def only_command(inputs: Mapping[str, ArrayLike | None], dt: ArrayLike | None) -> str:
+    """The name of the one command that was given. Raises InputError for none, for several, and without dt."""
+    names = [name for name, value in inputs.items() if value is not None]
+    if len(names) != 1 or dt is None:
+        raise InputError(
+            "cannot tell what to apply",
+            got=" and ".join(names) or "no command",
+            expected=f"one of {', '.join(inputs)}, and dt",
+        )
+    return names[0]
 
 
 def _from_duty(robot: Robot, rows: FloatArray, steps: FloatArray, supply: ArrayLike | None) -> Commands:

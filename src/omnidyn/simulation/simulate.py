@@ -67,7 +67,7 @@ def simulate(
     if not isinstance(robot, Robot):
         check_order(call, (robot, Robot), (voltage, type(robot)), (dt, object))
     if isinstance(voltage, int | float) and isinstance(dt, list | tuple | np.ndarray):
-        raise InputError("two arguments stand in each other's place", got="the time before the voltage", expected=call)
+        raise InputError("arguments swapped", got="the time before the voltage", expected=call)
     held_commands = commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
     view = seen_at_once(robot, held_commands) if log is None else seen_through(robot, held_commands, log)
     return simulate_seen(robot, held_commands, view, twist=twist, pose=pose, current=current, tol=tol)

@@ -125,13 +125,13 @@ def _not_white(statement: Statement) -> str:
 
 
 def _memory(statement: Statement) -> str:
-    """The residuals are not white; the errors are fitted as a process that remembers."""
+    """The residuals are not white; the errors are fitted as an autocorrelated process."""
     numbers = statement.numbers
     least, most = numbers["orders"] or (None, None)
     order = f"{least}" if least == most else f"{least} to {most}"
     ways = [] if least is None else [f"an autoregression of order {order}"]
     if beside := numbers["beside_white"]:
-        ways.append(f"white noise beside errors that remember{' while the robot moves' if beside == 'moving' else ''}")
+        ways.append(f"white noise beside autocorrelated errors{' while the robot moves' if beside == 'moving' else ''}")
     return (
         f"{_neighbours(statement)}: the errors of each output are fitted as {' or '.join(ways)}, with a memory of up "
         f"to {short(numbers['memory'])} s; {_widened(statement)}"
@@ -293,7 +293,7 @@ SENTENCES = {
         "misses {plain:%.3g} % of the spread of the outputs, {error:%.3g} % with them): they are not fitted"
     ),
     "white_predicts_better": Sentence(
-        "a fit that takes the errors to remember predicts {better} of {blocks} held-out blocks of the log worse (a "
+        "a fit with autocorrelated errors predicts {better} of {blocks} held-out blocks of the log worse (a "
         "free run misses {error:%.3g} % of the spread of the outputs, {white:%.3g} % by least squares): least squares "
         "are taken, and the model misses something"
     ),
@@ -335,8 +335,8 @@ SENTENCES = {
     "not_white": Sentence(_not_white),
     "autocorrelated_noise": Sentence(_memory),
     "short_for_memory": Sentence(
-        "the errors of {subject} remember {memory:~.2g} s, and the logs last {times:.1f} times that: the memory "
-        "is hardly known, nor are the intervals; record {enough:~.2g} s or more"
+        "the errors of {subject} are correlated over {memory:~.2g} s, and the logs last {times:.1f} times that: the "
+        "memory is hardly known, nor are the intervals; record {enough:~.2g} s or more"
     ),
     "uneven_rows": Sentence(
         "{share:.0%} of the rows do not come at even times: the errors are taken to forget as much from each row to "

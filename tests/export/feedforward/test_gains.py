@@ -165,7 +165,7 @@ def test_gains_of_wheels_per_tick():
         in_ticks = row["place"].startswith("wheel") and row["gain"] != "kS"
         assert float(other["value"]) == pytest.approx(float(row["value"]) * (np.pi / 180.0 if in_ticks else 1.0))
         assert other["unit"] == (row["unit"].replace("rad", "tick") if in_ticks else row["unit"])
-    with pytest.raises(InputError, match="no number of ticks in a turn of a wheel; got 0"):
+    with pytest.raises(InputError, match="not a number of ticks in a turn of a wheel; got 0"):
         gains_csv(ROBOT, 0.0)
     with pytest.raises(UnsupportedError, match=r"do not turn alike.*got 3 wheels.*gains of each wheel"):
         road_runner(ROBOT, ticks_per_turn=360.0)

@@ -149,7 +149,7 @@ def test_what_cannot_be_said_is_refused():
     short = log.replace(**{name: value[:5] for name, value in log.channels.items()}, t=log.t[:5])
     with pytest.raises(InputError, match="too few samples for a covariance; got 5"):
         ros2_control(ROBOT, short)
-    with pytest.raises(InputError, match="no horizon"):
+    with pytest.raises(InputError, match="not a horizon"):
         ros2_control(ROBOT, horizon=0.0)
 
 

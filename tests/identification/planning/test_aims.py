@@ -155,8 +155,8 @@ def test_wheels_that_may_slip_do_not_slip_under_a_plan():
     ("limits", "words"),
     [
         ({"power": 1.0}, "no such limit"),
-        ({"heat": 0.0}, "no limit of heat"),
-        ({"current": math.nan}, "no limit of current"),
+        ({"heat": 0.0}, "not a limit of heat"),
+        ({"current": math.nan}, "not a limit of current"),
         ({"traction": 1e-3}, "within the limit of traction"),
     ],
 )

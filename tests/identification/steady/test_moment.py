@@ -146,7 +146,7 @@ def test_a_shape_that_fits_on_neither_side_of_a_change_is_said_behind_it(factor)
 
 
 def held(seed, course, way=0.7, row=0.03):
-    """A robot driven one way for 17 s: levels [N] of time in the currents, with a noise that remembers a second."""
+    """A robot driven one way for 17 s: levels [N] of time in the currents, with noise that lasts a second."""
     rng, robot = np.random.default_rng(seed), load_robot("robotino")
     t = np.arange(0.0, 17.0, row)
     twist = 0.2 * np.array([np.cos(way), np.sin(way), 0.0])

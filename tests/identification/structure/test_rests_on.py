@@ -31,7 +31,7 @@ def fit(run):
     "key", ["body.mass_kg", "wheels.wheel_radius_m", "motor.resistance_ohm", "motor.emf_constant_Vs_rad"]
 )
 def test_a_refit_moves_each_number_as_said(run, fit, key):
-    """Rows weigh the same in all three: what a wrong file leaves may look like errors that remember."""
+    """Rows weigh the same in all three: what a wrong file leaves may look like autocorrelated errors."""
     assert fit.covariance == "white"
     up, down = (
         identify(run, scaled(AXEBOT, key, factor), OutputError(nuisances=(), covariance="white")).estimate

@@ -1,4 +1,4 @@
-"""Heavy tails: two wild samples in a hundred are named, with the loss that counts them little; noise is not."""
+"""Heavy tails: two outliers in a hundred are named, with the loss that counts them little; noise is not."""
 
 import numpy as np
 import pytest
@@ -72,7 +72,7 @@ def test_a_cause_that_wild_samples_hide_is_found_behind_them():
 
 @pytest.mark.long
 def test_the_loss_is_tried_where_the_cause_that_gains_more_does_not_pay():
-    """Another floor halfway, which no robot file holds, among wild samples: the fit bears them all the same."""
+    """Another floor halfway, which no robot file holds, among outliers: the fit bears them all the same."""
     case = by_name("floor").make(right_case(91), 0.5)
     run, robot, rng = logged(case, 91), robot_of(case.told), np.random.default_rng(7)
     assert run.wheel_speed is not None
@@ -103,13 +103,13 @@ def test_pulled_in_residuals_leave_a_robust_fit_where_it_is():
 
 
 def test_a_fit_that_counts_them_little_is_not_held_against_rows_that_hold_them():
-    """Neighbours in the log scatter by wild samples too: of that the residuals, pulled in, would be next to none."""
+    """Neighbours in the log scatter by outliers too: of that the residuals, pulled in, would be next to none."""
     lack = identify(spoiled(3, 100.0), AXEBOT, OutputError(nuisances=(), loss="student-t")).lack_of_fit
     assert all(one.chi2 > 0.8 for one in lack.noise.values())
 
 
 def test_student_t_counts_them_little():
-    """Its intervals are those of a log without wild samples, within a fifth; Gauss's are not."""
+    """Its intervals are those of a log without outliers, within a fifth; Gauss's are not."""
     bare, wild = spoiled(2, 1.0), spoiled(2, 30.0)
     name = "friction.axes.viscous[0]"
     clean = identify(bare, AXEBOT, OutputError(nuisances=())).std[name]

@@ -47,7 +47,7 @@ def test_a_late_set_point_counts_from_the_next_tick():
 
 
 def test_a_step_that_is_no_whole_number_of_ticks_is_refused():
-    with pytest.raises(InputError, match="no whole number of ticks"):
+    with pytest.raises(InputError, match="not a whole number of ticks"):
         RobotEnv("lekiwi", dt=0.0205e-1)
 
 

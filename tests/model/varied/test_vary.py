@@ -195,7 +195,7 @@ def test_something_else_is_refused():
         ("[variations.loads.x]\nmass_kg = 1.0", r"unknown key.*got loads"),
         ("[variations.floor.x]", r"a key is missing; expected friction"),
         ("[variations.floor.x.friction]", r"a floor without friction"),
-        ('[variations.tilt."a=b"]\ntilt_deg = 1.0', r"no name that can be asked for"),
+        ('[variations.tilt."a=b"]\ntilt_deg = 1.0', r"not a name that can be asked for"),
         ("[variations.floor.x.friction.axes]\nviscos = [1.0, 1.0, 1.0]", r"did you mean viscous"),
         ("[floor]\ntilt_deg = 46.0", r"less than or equal to 45"),
     ],

@@ -26,7 +26,7 @@ def robot():
         ({"robots": None}, "robots: not robots; got NoneType"),
         ({"robots": 5}, "robots: not robots; got int"),
         ({"robots": "axebot"}, "robots: not robots; got str"),
-        ({"supply": np.array([5.0, 6.0])}, "supply: no supply"),
+        ({"supply": np.array([5.0, 6.0])}, "supply: not a supply"),
         ({"threads": 1.5}, "threads: cannot work with so many threads"),
         ({"threads": True}, "threads: cannot work with so many threads"),
         ({"every": 2.5}, "every: cannot keep every so many samples"),

@@ -176,7 +176,7 @@ def test_volts_beyond_the_limit_are_clipped_and_told():
         (lambda: omnidyn.simulate_batch([ROBOT], VOLTAGE, DT, threads=0), "threads"),
         (lambda: omnidyn.simulate_batch([ROBOT], VOLTAGE, DT, every=0), "every"),
         (lambda: omnidyn.simulate_batch([ROBOT], VOLTAGE, DT, duty=VOLTAGE), "voltage and duty"),
-        (lambda: omnidyn.Batch([ROBOT], DT).reset([1]), "no mask"),
+        (lambda: omnidyn.Batch([ROBOT], DT).reset([1]), "not a mask"),
         (lambda: omnidyn.simulate_batch([ROBOT], duty=VOLTAGE, dt=DT), "needs a supply"),
     ],
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import omnidyn
-from omnidyn.files import MAX_TEXT_BYTES, read_bytes, sha256
+from omnidyn.files import read_bytes, sha256
 from omnidyn.model.presets import preset_names, robot_path
 
 _command_line = "omnidyn"
@@ -24,9 +24,9 @@ def provenance(inputs: list[dict[str, str]]) -> dict[str, Any]:
     return {"omnidyn": omnidyn.__version__, "command": _command_line, "inputs": inputs}
 
 
-def input_file(role: str, path: str, max_bytes: int = MAX_TEXT_BYTES) -> dict[str, str]:
+def input_file(role: str, path: str) -> dict[str, str]:
     """Role, name and SHA-256 of an input. Raises InputError when it cannot be read."""
-    return {"role": role, "name": path, "sha256": sha256(read_bytes(path, max_bytes))}
+    return {"role": role, "name": path, "sha256": sha256(read_bytes(path))}
 
 
 def robot_input(robot: str) -> dict[str, str]:

@@ -16,6 +16,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from omnidyn.arguments import is_whole
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import machine_code
 from omnidyn.control.controller import (
@@ -348,7 +349,7 @@ class Mpc:
 
 
 def _whole(name: str, value: Any, low: int, high: int) -> int:
-    """A whole number in a range. Raises InputError for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
-        raise InputError("no whole number in range", got=value, expected=f"{low} to {high}", where=name)
+    """An integer in a range. Raises InputError for anything else."""
+    if not is_whole(value) or not low <= value <= high:
+        raise InputError("not an integer in the range", got=value, expected=f"{low} to {high}", where=name)
     return int(value)

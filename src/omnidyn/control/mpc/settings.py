@@ -97,14 +97,14 @@ class Settings:
                 continue
             value = np.asarray(getattr(self, name), dtype=float)
             if value.shape != (3,) or not np.all((value >= 0.0) & (value <= 1e9)):
-                raise InputError("no weights", got=getattr(self, name), expected="three numbers >= 0", where=name)
+                raise InputError("not weights", got=getattr(self, name), expected="three numbers >= 0", where=name)
         for name in ("current", "slew"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value <= 1e9:
-                raise InputError("no limit", got=value, expected="a number above 0, or None", where=name)
+                raise InputError("not a limit", got=value, expected="a number above 0, or None", where=name)
         speed = self.speed
         if speed is not None and (len(speed) != 3 or not all(0.0 < limit <= 1e9 for limit in speed)):
-            raise InputError("no limits", got=speed, expected="three numbers above 0, or None", where="speed")
+            raise InputError("not limits", got=speed, expected="three numbers above 0, or None", where="speed")
         for name, low, high in (("last", 0.0, 1e6), ("again", 1, 20), ("scale_walk", 0.0, 10.0)):
             if not low <= getattr(self, name) <= high:
                 raise InputError("out of range", got=getattr(self, name), expected=f"{low:g} to {high:g}", where=name)

@@ -35,7 +35,7 @@ def as_path(path: Any) -> Path:
         return path
     if not callable(getattr(path, "at", None)):
         raise InputError(
-            "no path",
+            "not a path",
             got=type(path).__name__,
             expected="a Path, or an object with at(t) and end",
             remedy="omnidyn.path(...) makes one of a name, a file, an array or a function",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import os
 from collections.abc import Callable, Mapping
@@ -18,7 +17,7 @@ from omnidyn.control.paths.curve import Curve, circle, eight, square, swinging, 
 from omnidyn.control.paths.goal import Goal
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.polyline import COLUMNS, Polyline, lines, path_of_file, path_of_run
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, did_you_mean
 from omnidyn.run import Run
 
 HEADINGS = ("held", "turning", "along")
@@ -80,12 +79,11 @@ def path(what: Any, **options: Any) -> Path:
     if FilePath(text).suffix or os.path.exists(text):
         _refuse_options(options, "a file")
         return path_of_file(text)
-    matches = difflib.get_close_matches(name, OPTIONS, 1)
     raise InputError(
         "unknown path",
         got=text,
         expected=f"{', '.join(OPTIONS)}, or a file of t_s, x_m, y_m, heading_rad",
-        remedy=f"did you mean {matches[0]}?" if matches else "",
+        remedy=did_you_mean(name, OPTIONS),
         where="path",
     )
 
@@ -118,7 +116,7 @@ def _path_of_value(what: Any, options: Mapping[str, Any]) -> Path:
         rows: FloatArray = np.empty((0, 0))
     if rows.ndim != 2 or rows.shape[1] != len(COLUMNS):
         raise InputError(
-            "no path",
+            "not a path",
             got=f"{type(what).__name__}{f' of shape {rows.shape}' if rows.size else ''}",
             expected=f"a name, a file, a Run, a function, an object with at(t), or rows of {', '.join(COLUMNS)}",
             where="path",
@@ -137,7 +135,7 @@ def _parsed(text: str, source: str) -> dict[str, str]:
     for part in filter(None, text.split(",")):
         name, sign, value = part.partition("=")
         if not sign:
-            raise InputError("no option of a path", got=part, expected="name=value", where=source)
+            raise InputError("not an option of a path", got=part, expected="name=value", where=source)
         options[name.strip()] = value.strip()
     return options
 

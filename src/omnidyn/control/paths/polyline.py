@@ -59,7 +59,7 @@ def lines(t: ArrayLike, pose: ArrayLike, name: str) -> Polyline:
     time, place = np.asarray(t, dtype=float), np.array(pose, dtype=float)
     if time.ndim != 1 or place.shape != (len(time), 3) or len(time) < 2:
         raise InputError(
-            "no path",
+            "not a path",
             got=f"{time.shape} times and {place.shape} poses",
             expected="(rows,) and (rows, 3), rows >= 2",
             where=name,
@@ -98,14 +98,14 @@ def through(points: ArrayLike, speed: float, closed: bool, name: str) -> Polylin
         place: FloatArray = np.empty(0)
     if place.ndim != 2 or place.shape[1:] != (2,) or not (np.abs(place) <= LARGEST_PLACE).all():
         got = f"{len(place)} points"
-        raise InputError("no drawn path", got=got, expected=f"points (x, y) up to {LARGEST_PLACE:g} m", where=name)
+        raise InputError("not a drawn path", got=got, expected=f"points (x, y) up to {LARGEST_PLACE:g} m", where=name)
     if not SLOWEST <= speed <= FASTEST:
         raise InputError("out of range", got=speed, expected=f"{SLOWEST:g} to {FASTEST:g} m/s", where="speed")
     place = np.concatenate([place, place[:1]]) if closed else place
     lengths = np.hypot(*np.diff(place, axis=0).T)
     if not (lengths > NEAREST).any():
         raise InputError(
-            "no drawn path", got="no two different points", expected="a line", remedy="draw one", where=name
+            "not a drawn path", got="no two different points", expected="a line", remedy="draw one", where=name
         )
     place = np.concatenate([place[:1], place[1:][lengths > NEAREST]])
     t = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(place, axis=0).T))]) / speed
@@ -131,14 +131,6 @@ def path_of_file(path: str | os.PathLike) -> Polyline:
     from omnidyn.logs.readers.read_table import read_table  # imported lazily: named paths need no reader
 
     table = read_table(path)
-    absent = [name for name in COLUMNS if name not in table.names]
-    if absent:
-        raise InputError(
-            "no path in this file",
-            got=", ".join(table.names),
-            expected=", ".join(COLUMNS),
-            remedy=f"add {', '.join(absent)}",
-            where=table.source,
-        )
+    table.require(COLUMNS, what="no path in this file")
     t, *pose = (table.measured(name) for name in COLUMNS)
     return lines(t, np.column_stack(pose), str(table.source))

@@ -91,25 +91,18 @@ EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
 
 #define NOTHING(name, parameters) HAS(name, parameters) { return fmi2OK; }
 #define LACKS(name, parameters) HAS(name, parameters) { return fmi2Error; }
-#define NO_UNIT(name, parameters)                                                                                     \
+#define UNIT(name, parameters)                                                                                        \
     EXPORT fmi3Instance name parameters;                                                                              \
-    EXPORT fmi3Instance name parameters { return NULL; }
+    EXPORT fmi3Instance name parameters
+#define NO_UNIT(name, parameters) UNIT(name, parameters) { return NULL; }
 #define NO_TYPE(name, type)                                                                                           \
     HAS(fmi3Get##name, (WHICH, type values[], size_t count)) { return n == 0 ? fmi2OK : fmi2Error; }                  \
     HAS(fmi3Set##name, (WHICH, const type values[], size_t count)) { return n == 0 ? fmi2OK : fmi2Error; }
 
-EXPORT fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String place, bool visible,
-                                                bool logging, bool events, bool early,
-                                                const fmi3ValueReference required[], size_t n, void *environment,
-                                                void (*message)(void *, fmi3Status, fmi3String, fmi3String),
-                                                void (*update)(void *, double, bool, bool, bool, bool, bool *,
-                                                               double *));
-EXPORT fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String place, bool visible,
-                                                bool logging, bool events, bool early,
-                                                const fmi3ValueReference required[], size_t n, void *environment,
-                                                void (*message)(void *, fmi3Status, fmi3String, fmi3String),
-                                                void (*update)(void *, double, bool, bool, bool, bool, bool *,
-                                                               double *))
+UNIT(fmi3InstantiateCoSimulation, (fmi3String name, fmi3String token, fmi3String place, bool visible, bool logging,
+                                   bool events, bool early, const fmi3ValueReference required[], size_t n,
+                                   void *environment, void (*message)(void *, fmi3Status, fmi3String, fmi3String),
+                                   void (*update)(void *, double, bool, bool, bool, bool, bool *, double *)))
 {
     return fmi2Instantiate(name, fmi2CoSimulation, token, place, NULL, visible, logging);
 }

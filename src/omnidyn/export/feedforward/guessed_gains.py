@@ -31,7 +31,7 @@ def check_ticks(ticks_per_turn: float | None) -> None:
     """Raises InputError for what is no number of ticks in a turn of a wheel."""
     if ticks_per_turn is not None and not 0.0 < ticks_per_turn <= MOST_TICKS:
         raise InputError(
-            "no number of ticks in a turn of a wheel",
+            "not a number of ticks in a turn of a wheel",
             got=ticks_per_turn,
             expected=f"more than 0 and at most {MOST_TICKS:g}",
             where="ticks_per_turn",

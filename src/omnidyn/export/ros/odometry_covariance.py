@@ -41,7 +41,7 @@ def covariance(robot: Robot, runs: Sequence[Run], horizon: float) -> Covariance:
     horizon [s]: after which the pose is that uncertain. Raises InputError for runs from which it cannot be told.
     """
     if not 0.0 < horizon <= 1e6:
-        raise InputError("no horizon", got=horizon, expected="more than 0 and at most 1e6 s", where="horizon")
+        raise InputError("not a horizon", got=horizon, expected="more than 0 and at most 1e6 s", where="horizon")
     return _from_runs(robot, runs, horizon) if runs else _from_robot(robot, horizon)
 
 

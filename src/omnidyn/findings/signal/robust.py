@@ -1,4 +1,4 @@
-"""Estimates that a few wild values cannot move: noise, steps of quantisation, slopes between two noisy channels."""
+"""Estimates that a few outliers cannot move: noise, steps of quantisation, slopes between two noisy channels."""
 
 from __future__ import annotations
 

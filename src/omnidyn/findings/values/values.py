@@ -262,7 +262,7 @@ def _wheel_reason(work: LogUnderCheck, channel: str, k: int) -> str:
 
 
 def spread_of_motion(values: FloatArray) -> float:
-    """How far a channel gets from 0, without its wildest rows."""
+    """How far a channel gets from 0, without its outliers."""
     values = values[np.isfinite(values)]
     return float(np.quantile(np.abs(values), 0.95)) if values.size else 0.0
 

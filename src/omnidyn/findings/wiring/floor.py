@@ -19,7 +19,7 @@ from omnidyn.findings.wiring.orders import (
     choose,
     code_of,
     means,
-    rivals_of,
+    wiring_finding,
     wirings,
 )
 from omnidyn.findings.wiring.pose_frame import commands_agree
@@ -218,20 +218,5 @@ def wheels_finding(work: LogUnderCheck, answer: WiringChoice, blamed: str) -> Fi
         else ("twist_command" if work.get("twist_command") is not None else "")
     )
     names = components("wheel_speed", work.wheels)
-    return Finding(
-        code_of(answer.best),
-        ERROR,
-        " ".join(answer.best.touched(names)),
-        {
-            "unexplained_as_logged": answer.logged,
-            "unexplained_put_right": answer.left,
-            "as_good": float(answer.others),
-            "channel": "wheel_speed",
-            "against": against,
-            "blamed": blamed,
-            "wiring": answer.best.statement(names),
-            **rivals_of(answer, names),
-        },
-        "wheels",
-        rests_on=GEOMETRY,
-    )
+    numbers = {"channel": "wheel_speed", "against": against, "blamed": blamed}
+    return wiring_finding(answer, names, numbers, "wheels", GEOMETRY)

@@ -10,9 +10,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import CURRENT_AND_VOLTAGE, emf, ohmic, volts
-from omnidyn.findings.wiring.orders import Wiring, WiringChoice, choose, code_of, means, rivals_of, wirings
+from omnidyn.findings.wiring.orders import Wiring, WiringChoice, choose, means, wiring_finding, wirings
 from omnidyn.logs.channels import components
-from omnidyn.statement import ERROR
 
 HOLDS = 0.25  # of the voltage: where more is left of it under every wiring, a scale is wrong, and no wiring is told
 EXACT_SHARE = 0.004  # of the voltage: what less is left of it is the noise of an exact relation
@@ -111,19 +110,4 @@ def motor_finding(work: LogUnderCheck, channel: str, answer: WiringChoice, rests
     """Errors: columns of one channel of the motors are exchanged, or have the opposite sign."""
     names = components(channel, work.wheels)
     against = "wheel_speed" if channel != "wheel_speed" else CURRENT_AND_VOLTAGE
-    return Finding(
-        code_of(answer.best),
-        ERROR,
-        " ".join(answer.best.touched(names)),
-        {
-            "unexplained_as_logged": answer.logged,
-            "unexplained_put_right": answer.left,
-            "as_good": float(answer.others),
-            "channel": channel,
-            "against": against,
-            "wiring": answer.best.statement(names),
-            **rivals_of(answer, names),
-        },
-        "motors",
-        rests_on=rests_on,
-    )
+    return wiring_finding(answer, names, {"channel": channel, "against": against}, "motors", rests_on)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import permutations, product
 from typing import NamedTuple
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.robust import windowed
-from omnidyn.statement import NOTE, Statement
+from omnidyn.statement import ERROR, NOTE, Statement
 
 BEST_SHARE = 0.35  # the right wiring leaves at most so much of what the logged one leaves
 POOR = 0.02  # a wiring that leaves less than this share of the motion unexplained is not doubted
@@ -113,7 +114,27 @@ def code_of(wiring: Wiring) -> str:
     return "swapped" if any(k != j for k, j in enumerate(wiring.order)) else "inverted"
 
 
-def rivals_of(answer: WiringChoice, names: tuple[str, ...]) -> dict[str, Statement]:
-    """Another wiring that the log cannot tell from the best one."""
+def wiring_finding(
+    answer: WiringChoice, names: tuple[str, ...], numbers: Mapping[str, object], remedy: str, rests_on: tuple[str, ...]
+) -> Finding:
+    """An error: columns of these names are in another order, or of the opposite sign.
+
+    Its numbers: how well each order explains the log, `numbers`, what is mended, and another order that the log cannot
+    tell from that one.
+    """
     rival = answer.rival if answer.second is None else answer.second.statement(names)
-    return {} if rival is None else {"rival": rival}
+    return Finding(
+        code_of(answer.best),
+        ERROR,
+        " ".join(answer.best.touched(names)),
+        {
+            "unexplained_as_logged": answer.logged,
+            "unexplained_put_right": answer.left,
+            "as_good": float(answer.others),
+            **numbers,
+            "wiring": answer.best.statement(names),
+            **({} if rival is None else {"rival": rival}),
+        },
+        remedy,
+        rests_on=rests_on,
+    )

@@ -27,6 +27,16 @@ class Turned(NamedTuple):
     alike: float
     plain: float
 
+    @property
+    def numbers(self) -> dict[str, float]:
+        """What a finding tells of it."""
+        return {
+            "angle_deg": float(np.degrees(self.angle)),
+            "error_deg": float(np.degrees(self.error)),
+            "likeness": self.alike,
+            "likeness_as_logged": self.plain,
+        }
+
 
 def turned(work: LogUnderCheck, reference: FloatArray, second: FloatArray, rate: FloatArray) -> Turned | None:
     """How `second` is turned against `reference`, shapes (rows, 2), in a robot that turns at `rate` [rad/s], (rows,).
@@ -68,20 +78,7 @@ def marker_finding(turn: Turned, source: str, agrees: str = "") -> Finding:
 
     turn: of what `source` says, and `agrees` too, against the pose.
     """
-    degrees = float(np.degrees(turn.angle))
-    return Finding(
-        "marker_angle",
-        WARNING,
-        "heading",
-        {
-            "angle_deg": degrees,
-            "error_deg": float(np.degrees(turn.error)),
-            "likeness": turn.alike,
-            "likeness_as_logged": turn.plain,
-            "source": source,
-            "agrees": agrees,
-        },
-    )
+    return Finding("marker_angle", WARNING, "heading", {**turn.numbers, "source": source, "agrees": agrees})
 
 
 def with_marker(work: LogUnderCheck, pose: FloatArray, angle: float) -> LogUnderCheck:

@@ -67,7 +67,7 @@ def _against_twist(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> 
         and room.left < BEST_SHARE * (1.0 - plain.turn.plain)
     ):
         likeness = {"likeness": room.turn.plain, "likeness_as_logged": plain.turn.plain}
-        return [Finding("twist_frame", ERROR, "vx vy", likeness)], work.replace(twist=_as_in_body(work, pose, twist))
+        return [Finding("twist_frame", ERROR, "vx vy", likeness)], work.replace(twist=_as_in_body(pose, twist))
     if best.signs != (1.0, 1.0, 1.0) and 1.0 - best.left > TURNED_LIKENESS and best.left < BEST_SHARE * plain.left:
         return [_mirror_finding(plain, best)], work.replace(pose=pose * best.signs)
     if is_turned(plain.turn):
@@ -79,12 +79,12 @@ def _found(
     work: LogUnderCheck, pose: FloatArray, twist: FloatArray, signs: tuple[float, float, float], room: bool
 ) -> FrameCandidate | None:
     body, width = pose_twist(work, pose * signs)
-    plane_velocity = smooth(twist[:, :2], width) if not room else smooth(_as_in_body(work, pose, twist)[:, :2], width)
+    plane_velocity = smooth(twist[:, :2], width) if not room else smooth(_as_in_body(pose, twist)[:, :2], width)
     turn = turned(work, body[:, :2], plane_velocity, body[:, 2])
     return None if turn is None else FrameCandidate(signs, room, turn)
 
 
-def _as_in_body(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> FloatArray:
+def _as_in_body(pose: FloatArray, twist: FloatArray) -> FloatArray:
     """The twist, taken as one in the frame of the room, in that of the robot."""
     plane = (twist @ [1.0, 1.0j, 0.0]) * np.exp(-1j * unwrapped(pose[:, 2]))
     return np.column_stack([plane.real, plane.imag, twist[:, 2]])
@@ -124,20 +124,7 @@ def _others(work: LogUnderCheck, width: int) -> list[tuple[str, FloatArray]]:
 
 
 def _sensor_finding(turn: Turned, name: str) -> Finding:
-    degrees = float(np.degrees(turn.angle))
-    return Finding(
-        "twist_frame",
-        WARNING,
-        "vx vy",
-        {
-            "angle_deg": degrees,
-            "error_deg": float(np.degrees(turn.error)),
-            "likeness": turn.alike,
-            "likeness_as_logged": turn.plain,
-            "agrees": name,
-        },
-        "turned",
-    )
+    return Finding("twist_frame", WARNING, "vx vy", {**turn.numbers, "agrees": name}, "turned")
 
 
 def _turned_back(twist: FloatArray, angle: float) -> FloatArray:

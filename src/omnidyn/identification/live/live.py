@@ -56,8 +56,11 @@ class Live:
     >>> robot, rng = omnidyn.load_robot("axebot"), np.random.default_rng(0)
     >>> run = omnidyn.simulate(robot, np.repeat(rng.uniform(-5.0, 5.0, (30, 3)), 40, axis=0), dt=0.01)
     >>> log = omnidyn.Run(t=run.t, voltage=run.voltage, twist=run.twist + 0.005 * rng.normal(size=run.twist.shape))
-    >>> number = omnidyn.Live(robot).add(log).numbers["friction.axes.coulomb[0]"]
+    >>> live = omnidyn.Live(robot)
+    >>> number = live.add(log).numbers["friction.axes.coulomb[0]"]
     >>> number.low < 2.2 < number.high
+    True
+    >>> live.robot_now.friction.axes.coulomb[0] == number.value
     True
     """
 
@@ -158,8 +161,8 @@ class Live:
     def finish(self) -> LiveStatus:
         """The answer when the drive has ended: all rows that are kept fitted anew.
 
-        Where errors remember, the likelihood has several optima some tenths of a standard error apart; this is the one
-        at which `identify` ends too, as long as the log is no longer than a whole fit here.
+        Where errors are autocorrelated, the likelihood has several optima, some tenths of a standard error apart. This
+        is the one at which `identify` ends too, as long as the log is no longer than a whole fit here.
         """
         if self._rows.last - self._start >= FIRST and self._fitted_at < self._rows.last:
             self._fit(self._rows.last)

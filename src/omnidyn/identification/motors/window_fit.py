@@ -35,7 +35,7 @@ DRAWS, SEED, BLOCK = 1000, 20121, 3
 FOLDS = 10  # shares of the windows, in time, that are left out in turn
 ITERATIONS, STEP_TOLERANCE = 200, 1e-8
 HUBER = 2.5
-MIDDLE = 0.6827  # of the draws: a few wild ones, of a line that is hardly determined, do not count in a std
+MIDDLE = 0.6827  # of the draws: a few outliers, of a line that is hardly determined, do not count in a std
 MIN_WINDOWS = 6
 COLUMN_TOLERANCE = 1e-3  # share of a column that the others leave over: below it they say the same
 

@@ -63,7 +63,7 @@ class OutputErrorEstimate(Estimate):
     """An Estimate from whole logs. `correlation` covers the nuisances too.
 
     nuisances: name -> Nuisance. noise: output -> std of what the model leaves, in the unit of the output; after
-    Student's t without its wild samples, of counts before the encoder rounds.
+    Student's t without its outliers, of counts before the encoder rounds.
     unidentifiable: names of what the data do not determine. Where the std of the robot file is a prior, the value is
     the one that goes best with all others, std and interval are those of the posterior, hardly more than what the file
     said; elsewhere both are infinite. Neither is ever shown. combinations: what the data determine of these numbers

@@ -235,7 +235,7 @@ def _refuse_blind(
 def noise_of(solver: Solver, solution: Solution) -> dict[str, float]:
     """Output -> standard deviation of its noise; outputs without a measurement are left out.
 
-    After a fit by Student's t: of the Gaussian noise that has this scale, so that wild samples have no part in it. Of
+    After a fit by Student's t: of the Gaussian noise that has this scale, so that outliers have no part in it. Of
     counts: before the encoder rounds; at least LEAST_SHARE of a tick.
     """
     columns = solver.problem.columns

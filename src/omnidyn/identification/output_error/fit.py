@@ -93,7 +93,7 @@ class Fit:
         progress: FitProgress | None = None,
         start_by_group: Mapping[str, tuple[Robot, OutputError]] | None = None,
     ) -> Fit:
-        """Make runs of any length and rate, split at gaps, a problem. groups: name of each run's group. start_by_group:
+        """The fit of runs of any length and rate, split at gaps. groups: name of each run's group. start_by_group:
         group -> the robot that it begins from and what is asked of it, where that is not the same in all; then every
         key of `question` is written out, and one of per_free that no group has is left out.
 
@@ -270,7 +270,7 @@ class Fit:
         }
 
     def weighed(self, solution: Solution, progress: FitProgress | None = None, may_refit: bool = True) -> Weighed:
-        """The trust in a solution; where its errors remember, that in the fit made anew for it, and its point.
+        """The trust in a solution, and its point; where its errors are autocorrelated, those of the fit made anew.
 
         may_refit: whether there is time for that; after an interrupt there is none.
 

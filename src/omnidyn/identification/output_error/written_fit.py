@@ -1,6 +1,6 @@
 """Which of several fits to the same logs is written: that whose free run predicts held-out blocks best.
 
-Nobody asked by name for the nuisances that are fitted by default, nor for errors that remember. Both make a likelihood
+Nobody asked by name for the nuisances that are fitted by default, nor for autocorrelated errors. Both make a likelihood
 larger where the model misses something, and may lead its numbers to where its free run is worse than that of a plain
 fit: friction and what is free, white noise, no nuisances. So the plain fit stands beside each of them.
 """
@@ -96,7 +96,7 @@ def best_with_force(solution: Solution, forced_solutions: Sequence[Solution]) ->
 
 
 def why_white(white: Solution, weighed_fit: Weighed) -> Statement | None:
-    """Why least squares are taken in the place of a fit whose errors remember; None where they are not."""
+    """Why least squares are taken in the place of a fit whose errors are autocorrelated; None where they are not."""
     margins = margins_of([white])
     plain_run, own_run = free_run(white, margins), free_run(weighed_fit.solution, margins, weighed_fit.models)
     comparison = plain_run.improvement(own_run)

@@ -50,7 +50,7 @@ def limits_of(robot: Robot, given: Mapping[str, Any] | None, learns_grip: bool) 
         if name not in PlanLimits._fields:
             raise InputError("no such limit", got=name, expected=", ".join(PlanLimits._fields), where="limits")
         if not is_number(value) or not value > 0.0:
-            raise InputError(f"no limit of {name}", got=value, expected="a number above 0", where="limits")
+            raise InputError(f"not a limit of {name}", got=value, expected="a number above 0", where="limits")
         limits[name] = float(value)
     return PlanLimits(**limits)
 

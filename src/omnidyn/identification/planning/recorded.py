@@ -55,7 +55,7 @@ def noise_of(robot: Robot, dt: float, given: Mapping[str, object] | None = None)
             values = np.full(count, np.nan)
         if not (np.isfinite(values).all() and (values > 0.0).all()):
             expected = f"a number above 0, or {count} of them"
-            raise InputError(f"no noise of {channel}", got=std, expected=expected, where="noise")
+            raise InputError(f"not a noise of {channel}", got=std, expected=expected, where="noise")
         stds[channel] = values
     if not stds:
         raise InputError("nothing is recorded", got="no channel", expected=", ".join(CHANNELS), where="noise")

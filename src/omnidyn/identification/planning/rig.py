@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from omnidyn.arguments import check_order
+from omnidyn.arguments import check_order, is_number
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Points, Table, percent_cell, plain
 from omnidyn.errors import InputError, OmnidynError, UnsupportedError
@@ -154,7 +154,7 @@ def plan_rig(
     """
     check_order("plan_rig(robot, seconds)", (robot, Robot), (seconds, object))
     for name, value, least, most in (("seconds", seconds, SHORTEST, LONGEST), ("rate", rate, 20.0, 1000.0)):
-        if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
+        if not is_number(value) or not least <= value <= most:
             raise InputError("out of range", got=value, expected=f"{least:g} to {most:g}", where=name)
     if robot.drive.kind == SPEED:
         raise UnsupportedError(

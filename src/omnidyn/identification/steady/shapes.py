@@ -248,7 +248,7 @@ def friction_of(shape: Shape, robot: Robot, level: dict[str, float]) -> Friction
 # std        delete-one jackknife over the same folds: it needs no assumption on how the errors within one direction
 #            hang together. B. Efron, C. Stein, Ann. Stat. 9, 586 (1981)
 
-VECTOR, ALONG_TRAVEL = "vector", "along"
+VECTOR = "vector"
 HUBER = 2.0  # scales of a two-dimensional residual
 RAYLEIGH = 1.1774  # median length of a two-dimensional normal residual, in its standard deviations
 ITERATIONS, LEVEL_TOLERANCE, WEIGHT_TOLERANCE = 30, 1e-10, 1e-6

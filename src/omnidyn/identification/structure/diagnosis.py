@@ -32,7 +32,7 @@ from omnidyn.identification.structure.noise_level import noise_levels
 from omnidyn.identification.structure.residual_bins import binned
 from omnidyn.identification.structure.sensitivity_to_fixed import rests_on
 from omnidyn.identification.structure.shifts import stability
-from omnidyn.identification.structure.tails import as_counted, calmer, wild_samples
+from omnidyn.identification.structure.tails import as_counted, calmer, outliers_of
 from omnidyn.model.known.breakaway_levels import holding
 
 SLOW_DEGREES = 2.0  # degrees of freedom with which the power of the slowest errors is known within its own size
@@ -76,7 +76,7 @@ def examine(solution: Solution) -> Examined:
     problem, misfit_result = rows.problem, misfit(rows, piece_motions)
     stable = stability(misfit_result.linear)
     bench = Workbench(problem, point, type(solver.engine), piece_motions, stable.likely)
-    causes = [*candidates(bench), *unoffered(bench)]
+    causes = [*candidates(bench), *unoffered()]
     candidate_trials = _tried(bench, [candidate for candidate in causes if not candidate.is_late])
     ranking = remedies(misfit_result.linear, candidate_trials, misfit_result.columns_by_piece)
     count = int(sum(mask.sum() for mask in rows.masks))
@@ -95,7 +95,7 @@ def examine(solution: Solution) -> Examined:
     levels = noise_levels(misfit_result.linear, piece_motions, solver.nu > 0.0)
     has_cause = has_cause or bool(levels.beyond_names)
     channels = levels.channels(dict(zip(names, misfit_result.shares.tolist(), strict=True)))
-    outliers = {} if solver.nu else wild_samples(misfit_result, piece_motions)
+    outliers = {} if solver.nu else outliers_of(misfit_result, piece_motions)
     pictures = binned(rows, piece_motions, int(np.argmax([*channels.values()]))) if has_cause else ()
     lack = LackOfFit(
         has_cause,

@@ -30,7 +30,7 @@ from omnidyn.identification.output_error.linear.rows import (
     with_priors,
 )
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.structure.disturbances import THEMES, Theme, shown_by_themes
+from omnidyn.identification.structure.disturbances import THEMES, shown_by_themes
 
 FALSE_SHARE = 0.02  # of right models for which something is found, all tests together
 BEND_SHARE = 0.01  # of what rounded inputs show: what their first order is off by is no evidence
@@ -59,13 +59,13 @@ class Misfit:
     explained_by_piece: list[FloatArray]
 
 
-def misfit(rows: FitRows, motions: Sequence[DrivenMotion], themes: Sequence[Theme] = THEMES) -> Misfit:
+def misfit(rows: FitRows, motions: Sequence[DrivenMotion]) -> Misfit:
     """Test every theme, step by step: what is found first is part of the model when the rest is tested."""
     top = np.maximum(np.max([np.abs(m.twist).max(axis=0) for m in motions], axis=0), 1e-9)
     sensors = list(dict.fromkeys(sensor for motion in motions for sensor in motion.piece.record.columns))
-    columns_and_ends = [shown_by_themes(motion, top, sensors, themes) for motion in motions]
+    columns_and_ends = [shown_by_themes(motion, top, sensors, THEMES) for motion in motions]
     columns_by_piece, ends = [columns for columns, _ in columns_and_ends], np.cumsum([0, *columns_and_ends[0][1]])
-    columns_by_theme = {theme.name: np.arange(a, b) for theme, a, b in zip(themes, ends, ends[1:], strict=False)}
+    columns_by_theme = {theme.name: np.arange(a, b) for theme, a, b in zip(THEMES, ends, ends[1:], strict=False)}
     found_themes: list[Found] = []
     first: dict[str, float] = {}
     found_columns = np.zeros(0, dtype=int)
@@ -78,11 +78,11 @@ def misfit(rows: FitRows, motions: Sequence[DrivenMotion], themes: Sequence[Them
         }
         first = first or {name: p for name, (_, p, _) in scores.items()}
         best = _likeliest(scores)
-        if best and not found_themes and scores[best][1] > FALSE_SHARE / len(themes) and linear.degrees < LEAST_DEGREES:
+        if best and not found_themes and scores[best][1] > FALSE_SHARE / len(THEMES) and linear.degrees < LEAST_DEGREES:
             # A memory as long as the log may be the misfit itself: once more, with that of what each theme would leave.
             scores = {name: _beside(rows, columns_by_piece, found_columns, columns_by_theme[name]) for name in scores}
             best = _likeliest(scores)
-        if not best or scores[best][1] > FALSE_SHARE / len(themes):
+        if not best or scores[best][1] > FALSE_SHARE / len(THEMES):
             found_by_piece = [columns[:, :, found_columns] for columns in columns_by_piece]
             return Misfit(
                 tuple(found_themes), first, linear, found_by_piece, *_shares(linear, *residuals, bool(found_themes))
@@ -247,7 +247,7 @@ def _whitened(
     rounded inputs make of the rest).
 
     What they have taken out of the residuals belongs to the noise, too: see output_error/memory/whitening.py.
-    Rounds begin with noise that remembers nothing where inputs are rounded: that shows as a memory, and would stay one.
+    Rounds begin with white noise where inputs are rounded: that shows as a memory, and would stay one.
     """
     linear = Linear(rows, noise_models(rows, rows.residual, None, 0 if rows.rounding else None))
     residuals, rounded_parts = list(rows.residual), list(rows.residual)

@@ -1,8 +1,8 @@
-"""Heavy tails: a few wild samples that hold much of the squares of residuals, which normal noise does not.
+"""Heavy tails: a few outliers that hold much of the squares of residuals, which normal noise does not.
 
 They are no misfit of the model: they come one by one, whatever the robot does. What makes up for them is a loss that
 counts them little, Student's t: a remedy by what held-out blocks gain, which Huber's loss measures, as the square of a
-wild sample would drown every gain. Samples that are far out one after another, or where the robot speeds up or slows
+outlier would drown every gain. Samples that are far out one after another, or where the robot speeds up or slows
 down most, are what a wrong model leaves, and a loss that counts them little would hide it.
 """
 
@@ -17,7 +17,7 @@ from scipy.stats import mannwhitneyu
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import time_of_row
-from omnidyn.identification.lack_of_fit import LOSS, Remedy, Wild
+from omnidyn.identification.lack_of_fit import LOSS, Outliers, Remedy
 from omnidyn.identification.methods import NU
 from omnidyn.identification.output_error.engines.row_sums import row_terms
 from omnidyn.identification.output_error.linear.blocks import BlockProducts
@@ -39,11 +39,11 @@ SPRINKLED = 0.01  # chance of so many of them near each other, or where it chang
 ROUNDS = 20  # of weights and fit in turn
 
 
-def wild_samples(misfit_result: Misfit, piece_motions: Sequence[DrivenMotion]) -> dict[str, Wild]:
-    """Output -> its wild samples, where there are some: in what is left beside all that residuals follow, made white.
+def outliers_of(misfit_result: Misfit, piece_motions: Sequence[DrivenMotion]) -> dict[str, Outliers]:
+    """Output -> its outliers, where there are some: in what is left beside all that residuals follow, made white.
 
     F. R. Hampel's rule with the median absolute deviation, J. Am. Stat. Assoc. 69, 383 (1974), where those of every
-    output are sprinkled at random over its rows: else they are of one cause, and none is wild.
+    output are sprinkled at random over its rows: else they are of one cause, and none is an outlier.
     """
     linear, rows, change = (
         misfit_result.linear,
@@ -66,7 +66,7 @@ def wild_samples(misfit_result: Misfit, piece_motions: Sequence[DrivenMotion]) -
             if not sprinkled(outlier_mask, changes, near_rows):
                 return {}
             name, i = rows.problem.columns[c]
-            outliers_by_output[f"{name}[{i}]"] = Wild(float(outlier_mask.mean()), energy_share)
+            outliers_by_output[f"{name}[{i}]"] = Outliers(float(outlier_mask.mean()), energy_share)
     return outliers_by_output
 
 
@@ -96,7 +96,7 @@ def sprinkled(outlier_mask: BoolArray, change: FloatArray, near_rows: float) -> 
     return min(bursts, rises) > SPRINKLED
 
 
-def calmer(misfit_result: Misfit, outliers_by_output: Mapping[str, Wild]) -> tuple[Remedy, ...]:
+def calmer(misfit_result: Misfit, outliers_by_output: Mapping[str, Outliers]) -> tuple[Remedy, ...]:
     """Student's t as a remedy where samples are outliers_by_output: none, or one. Its gain is the share of the held-out
     error that it takes away beside all that residuals follow, of Huber's loss for both, so that it compares with other
     remedies."""

@@ -249,7 +249,7 @@ def _restarts(readings: FloatArray, steps: Steps, turn: float, tick: float) -> I
 
 
 def _alone(odd: IntArray, away: FloatArray, last: int) -> BoolArray:
-    """Which odd steps have none of their size beside them, as the two of a wild value have, and those of a push.
+    """Which odd steps have none of their size beside them, as the two of an outlier have, and those of a push.
 
     last: the last step, of which nobody knows what comes behind it; nor of the first what came before.
     """

@@ -7,7 +7,6 @@ for, of observation.state as what was measured. Each episode is a recording of i
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +17,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, shortened
-from omnidyn.files import open_regular, read_text
+from omnidyn.files import open_regular, read_text, sha256
 from omnidyn.logs.readers.folders import INFO, data_files, is_dataset_folder
 from omnidyn.logs.readers.parquet import (
     SUFFIXES,
@@ -169,7 +168,7 @@ def _dataset_tables(
             refuse_infinite(columns, lines, source)
             row_count += len(lines)
             yield table(columns, lines)
-    total_digest = digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
+    total_digest = digests[0] if len(digests) == 1 else sha256("".join(digests))
     yield table({}, np.zeros(0, dtype=np.int64), total_digest)
 
 

@@ -211,7 +211,7 @@ def read_wpilog(path: str | os.PathLike, options: ReadOptions) -> Recording:
     claims, topics = [], []
     for entry in file.entries.values():
         stamps = np.array(entry.stamps, dtype=np.int64) * 1000
-        outs, reason = _outs(entry, schemas, source, notes)
+        outs, reason = _outs(entry, schemas, notes)
         if outs:
             claims.append(TopicClaim(entry.name, stamps, outs, 1))
         topics.append(topic_of(printable(entry.name), printable(entry.kind), stamps, bool(outs), reason))
@@ -233,7 +233,7 @@ def _renamed(claims: list[TopicClaim]) -> list[TopicClaim]:
     return renamed
 
 
-def _outs(entry: Entry, schemas: dict[str, str], source: str, notes: list[str]) -> tuple[list[TopicColumn], str]:
+def _outs(entry: Entry, schemas: dict[str, str], notes: list[str]) -> tuple[list[TopicColumn], str]:
     """(the columns of an entry, why there are none)."""
     if not entry.keeps or entry.kind == SCHEMA or not len(entry.stamps):
         return [], "" if not len(entry.stamps) else "no numbers"

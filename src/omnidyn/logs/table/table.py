@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -11,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.errors import InputError, printable
+from omnidyn.errors import InputError, did_you_mean, printable
 from omnidyn.files import too_large
 from omnidyn.logs.table import dialect
 from omnidyn.logs.table.rows import Column
@@ -159,17 +158,20 @@ class FileTable:
         allowed = [*required, *optional]
         for name in self.names:
             if name not in allowed:
-                matches = difflib.get_close_matches(name, allowed, n=1, cutoff=0.4)
-                remedy = f"did you mean {matches[0]}?" if matches else "remove the column"
+                remedy = did_you_mean(name, allowed, "remove the column")
                 raise InputError(
                     "unknown column", got=name, expected=", ".join(allowed), remedy=remedy, where=self.source
                 )
+        self.require(required, allowed)
+
+    def require(self, required: Sequence[str], allowed: Sequence[str] = (), what: str = "a column is missing") -> None:
+        """Raises InputError where one of these columns is missing. allowed: what the error names; those by default."""
         absent = [name for name in required if name not in self.names]
         if absent:
             raise InputError(
-                "a column is missing",
+                what,
                 got=", ".join(self.names),
-                expected=", ".join(allowed),
+                expected=", ".join(allowed or required),
                 remedy=f"add {', '.join(absent)}",
                 where=self.source,
             )

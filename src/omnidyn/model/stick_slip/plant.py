@@ -98,7 +98,10 @@ def _fill_motors(robot: Robot, element: Any) -> None:
 
 @part
 def copy_row(to, source):
-    """to[:] = source for vectors; numba would make an array on the way, and take seconds to compile a message."""
+    """to[:] = source for vectors, of numbers or of records.
+
+    Numba would make an array on the way, and take seconds to compile a message.
+    """
     for j in range(len(to)):
         to[j] = source[j]
 
@@ -112,31 +115,24 @@ def copy_table(to, source):
 
 
 @part
-def copy_each(to, source):
-    """Take over the named states of every element."""
-    for e in range(len(to)):
-        to[e] = source[e]
-
-
-@part
 def copy_state(to, source):
     """Take over all of a state."""
     copy_row(to.x, source.x)
-    copy_each(to.each, source.each)
+    copy_row(to.each, source.each)
 
 
 @part
 def state_of_row(to, states, k):
     """Take over all of one of many states."""
     copy_row(to.x, states.x[k])
-    copy_each(to.each, states.each[k])
+    copy_row(to.each, states.each[k])
 
 
 @part
 def row_of_state(states, k, source):
     """Make one of many states the one given."""
     copy_row(states.x[k], source.x)
-    copy_each(states.each[k], source.each)
+    copy_row(states.each[k], source.each)
 
 
 @part

@@ -15,7 +15,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.files import write_atomic
-from omnidyn.logs.path import path_of
+from omnidyn.logs.path import drawable_path
 from omnidyn.model.robot import Robot
 from omnidyn.report.figures.robot import wheel_lines, wheel_places
 from omnidyn.report.figures.tracking import COLOURS
@@ -49,14 +49,7 @@ class Animation:
 
 def animate(run: Run, robot: Robot) -> Animation:
     """The robot on the way that a run went. Raises InputError for a run that does not say where that is."""
-    path = path_of(run, robot)
-    if path is None:
-        raise InputError(
-            "where it went is not in the run",
-            got=", ".join(run.channels),
-            expected="pose, twist or the wheel speeds of this robot",
-            where="run",
-        )
+    path = drawable_path(run, robot)
     pose = np.column_stack([path.position, path.heading])
     rows = np.isfinite(pose).all(axis=1)
     return Animation(moving_picture(robot, run.t[rows], {robot.name: pose[rows]}, pose[rows, :2]))

@@ -31,7 +31,7 @@ SECTORS = 36
 MAX_POINTS = 4000
 
 
-def draw_path(paths: Sequence[BodyPath], name: str = "where_it_went", of: str = "") -> Picture:
+def draw_path(paths: Sequence[BodyPath]) -> Picture:
     """The paths seen from above, a start as a ring and an end as a dot; and the metres driven per direction."""
     with look():
         figure = new_figure(WIDTH, 4.3)
@@ -45,7 +45,7 @@ def draw_path(paths: Sequence[BodyPath], name: str = "where_it_went", of: str = 
         left.set_title("path, y in m")
         _directions(right, paths)
         figure.text(0.575, 0.905, "metres driven per 10° of direction", fontsize=11.5)
-        return picture(name, f"Where the log{'s' * (len(paths) > 1)} went{of}", _caption(paths), figure)
+        return picture("where_it_went", f"Where the log{'s' * (len(paths) > 1)} went", _caption(paths), figure)
 
 
 def _path(axes: Axes, path: BodyPath, colour: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -35,6 +35,7 @@ from omnidyn.report.style import (
 )
 
 GROUP_COLOURS, GROUP_MARKS = (BLUE, VERMILLION, GREEN, PURPLE), ("o", "s", "^", "D")
+MARKS: dict[str, Any] = {"markersize": 3.5, "alpha": 0.55, "markeredgewidth": 0}  # of points that were measured
 LINES = ("-", "--", "-.", (0, (1, 1)))
 COMPARED = {"box": (ORANGE, ":"), "wheel": (SKY, "-.")}
 MAX_GROUPS, MAX_SHAPES = 4, 12
@@ -101,16 +102,8 @@ def draw_polar(study: SteadyStudy) -> Picture:
         for group, colour, mark, line in zip(groups, GROUP_COLOURS, GROUP_MARKS, LINES, strict=False):
             group_points = _of(study.points, group)
             name = "measured" if group == "all" else group
-            axes.plot(
-                np.arctan2(group_points.twist[:, 1], group_points.twist[:, 0]),
-                group_points.along,
-                mark,
-                color=colour,
-                markersize=3.5,
-                alpha=0.55,
-                markeredgewidth=0,
-                label=name,
-            )
+            directions = np.arctan2(group_points.twist[:, 1], group_points.twist[:, 0])
+            axes.plot(directions, group_points.along, mark, color=colour, label=name, **MARKS)
             directions, curve = _curve(study, group, study.choice.of(group), group_points)
             axes.plot(
                 np.radians(directions),
@@ -182,16 +175,7 @@ def _component(study: SteadyStudy, panel: Axes, component: int, group: str, numb
     colour = GROUP_COLOURS[number]
     directions = np.degrees(np.arctan2(group_points.twist[:, 1], group_points.twist[:, 0]))
     name = "measured" if group == "all" else group
-    panel.plot(
-        directions,
-        group_points.wrench[:, component],
-        GROUP_MARKS[number],
-        color=colour,
-        markersize=3.5,
-        alpha=0.55,
-        markeredgewidth=0,
-        label=name,
-    )
+    panel.plot(directions, group_points.wrench[:, component], GROUP_MARKS[number], color=colour, label=name, **MARKS)
     angles, curve = _curve(study, group, study.choice.of(group), group_points)
     label = study.choice.of(group) + ("" if group == "all" else f", {group}")
     panel.plot(angles, curve[:, component], color=colour, linestyle=LINES[number], label=label)  # type: ignore[arg-type]

@@ -20,7 +20,7 @@ from omnidyn.simulation.batch.parameters import batch_parameters, wheels_of
 from omnidyn.simulation.batch.result import BatchRun, BatchState, Statistics
 from omnidyn.simulation.batch.singles import SingleGroup
 from omnidyn.simulation.batch.threads import Threads
-from omnidyn.simulation.commands import MAX_DT, MIN_DT, as_floats
+from omnidyn.simulation.commands import MAX_DT, MIN_DT, as_floats, only_command
 from omnidyn.simulation.engine import LARGEST_START, as_start, as_tolerance
 from omnidyn.statement import WARNING, Statement
 
@@ -75,17 +75,12 @@ def simulate_batch(
     Raises InputError for wrong shapes, values that are not finite in what all robots share, a dt outside 1e-9..3600 s.
     """
     given = {VOLTAGE: voltage, DUTY: duty, WHEEL_SPEED: wheel_speed_command}
-    names = [name for name, value in given.items() if value is not None]
-    if len(names) != 1 or dt is None:
-        raise InputError(
-            "cannot tell what to apply",
-            got=" and ".join(names) or "no command",
-            expected=f"one of {', '.join(given)}, and dt",
-        )
+    name = only_command(given, dt)
+    assert dt is not None
     batch = Batch(
         robots,
         dt,
-        command=names[0],
+        command=name,
         supply=supply,
         start_twist=start_twist,
         start_pose=start_pose,
@@ -95,7 +90,7 @@ def simulate_batch(
         tol=tol,
         substeps=substeps,
     )
-    return batch.run(as_floats(names[0], given[names[0]]), every=every, statistics=statistics)
+    return batch.run(as_floats(name, given[name]), every=every, statistics=statistics)
 
 
 class Batch:
@@ -124,7 +119,7 @@ class Batch:
         _check_word("command", command, (VOLTAGE, DUTY, WHEEL_SPEED))
         _check_word("dtype", _dtype_name(dtype), ("float64", "float32"))
         if supply is not None and not is_number(supply):
-            raise InputError("no supply", got=supply, expected="one number of volts, or None", where="supply")
+            raise InputError("not a supply", got=supply, expected="one number of volts, or None", where="supply")
         if not is_whole(substeps) or not 1 <= substeps <= MOST_SUBSTEPS:
             raise InputError(
                 "cannot cut a row into so many steps",
@@ -209,7 +204,7 @@ class Batch:
         chosen = np.ones(self.count, bool) if mask is None else np.asarray(mask)
         if chosen.dtype != bool or chosen.shape != (self.count,):
             raise InputError(
-                "no mask of robots",
+                "not a mask of robots",
                 got=f"{chosen.dtype}, shape {chosen.shape}",
                 expected=f"bool, shape ({self.count},)",
                 where="mask",
@@ -247,7 +242,7 @@ class Batch:
                 "cannot keep every so many samples", got=every, expected="1 or more, or None", where="every"
             )
         commands = self._commands(as_floats(self.command, command))
-        return self._merged(commands, self._run(commands, every or 0, statistics), every or 0, statistics)
+        return self._merged(commands, self._run(commands, every or 0, statistics), every or 0)
 
     def _commands(self, rows: FloatArray) -> BatchCommands:
         shapes = f"(rows, {self.wheels}) or ({self.count}, rows, {self.wheels})"
@@ -283,7 +278,7 @@ class Batch:
             runs.append(run._replace(clipped=(run.clipped[0] // cuts, run.clipped[1] // cuts)))
         return runs
 
-    def _merged(self, commands: BatchCommands, runs: list[GroupRun], every: int, statistics: bool) -> BatchRun:
+    def _merged(self, commands: BatchCommands, runs: list[GroupRun], every: int) -> BatchRun:
         """One run of those of the groups."""
         samples = _together([run.samples for run in runs], self._groups, self.count)
         totals = _together([run.totals for run in runs], self._groups, self.count)

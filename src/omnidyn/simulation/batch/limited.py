@@ -96,7 +96,7 @@ def _put_volts(volts, source, marks, k, zero):
 
 
 @inlined
-def _mark(work, first, at, volts, mark, zero):
+def _mark(work, first, at, volts, mark):
     """Mark what has a motor beyond its limit at the speeds in rows `at`..."""
     vx, vy, w = work[at], work[at + 1], work[at + 2]
     for wheel in range(len(volts)):
@@ -166,8 +166,8 @@ def march_limited(first, last, laws, rows, record, rule, alone):
                     work[NODE, n], work[NODE + 1, n], work[NODE + 2, n], mark[n] = zero, zero, zero, zero
                 put_stage(work, NODE, zero, rule.box, k, zero)
                 put_stage(work, END, k[BACKWARD], rule.box, k, zero)
-                _mark(work, extra, NODE, own, mark, zero)
-                _mark(work, extra, END, own, mark, zero)
+                _mark(work, extra, NODE, own, mark)
+                _mark(work, extra, END, own, mark)
                 for n in range(WIDTH):
                     some = (coasting[n] > zero) & (coasting[n] < all_coast) & (row < fails[b, n])
                     if some or (mark[n] > zero and coasting[n] == zero):

@@ -13,10 +13,10 @@ import math
 import numpy as np
 
 from omnidyn.compiled.kernel import branching_kernel, part
+from omnidyn.model.stick_slip.plant import copy_row, copy_table
 from omnidyn.simulation.coulomb.events import astray, happens
 from omnidyn.simulation.coulomb.limits import led_astray, put_in_force
 from omnidyn.simulation.coulomb.sampling import move_on, take_samples
-from omnidyn.simulation.coulomb.state import copy, copy_table
 from omnidyn.simulation.coulomb.step import GAMMA, derive_step, end_rate, short_step, solve_step, step_error
 from omnidyn.simulation.speed_loop import passed, tick_answer, tick_branch
 
@@ -80,9 +80,9 @@ def _row(seen, law, work, outside, doutside, volts, dvolts, bound, begin, dt, h,
         move_on(work, length, event)
         known_end = take_samples(seen, law, work, force, dforce, now, length, share, event, knows)
         knows = known_end and not event and not limited
-        copy(work.x, work.ends[2])
-        copy(work.rate[0], work.rate[1])
-        copy(work.travel[0], work.travel[1])
+        copy_row(work.x, work.ends[2])
+        copy_row(work.rate[0], work.rate[1])
+        copy_row(work.travel[0], work.travel[1])
         copy_table(work.d, work.dends[2])
         copy_table(work.dtravel[0], work.dtravel[1])
         if knows:
@@ -183,12 +183,12 @@ def run_loop(law, dt, loop, before, dbefore, work, step, tol, step_limit, seen):
     for j in range(len(dt)):
         if loop.tick[j]:
             _tick(loop, work.x, work.d, j, volts, dvolts)
-        copy(loop.ask[j], volts)
+        copy_row(loop.ask[j], volts)
         for k in range(len(dvolts)):
-            copy(loop.dask[k, j], dvolts[k])
+            copy_row(loop.dask[k, j], dvolts[k])
         _behind_the_driver(loop, j, passed_volts, passed_rates)
         if len(law.wheel) > 0:
-            copy(force, loop.push)
+            copy_row(force, loop.push)
         else:
             _add_force(loop, passed_volts, passed_rates, force, dforce)
         step[0], count = _row(

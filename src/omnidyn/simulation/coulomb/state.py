@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.compiled.kernel import part
 from omnidyn.simulation.coulomb.stage import SLIDES
 
 
@@ -148,16 +147,3 @@ class Loop(NamedTuple):
     dsum: FloatArray  # (K, n)
     ask: FloatArray  # (J, n) [V]
     dask: FloatArray  # (K, J, n)
-
-
-@part
-def copy(to, source):
-    for j in range(len(to)):
-        to[j] = source[j]
-
-
-@part
-def copy_table(to, source):
-    for j in range(to.shape[0]):
-        for k in range(to.shape[1]):
-            to[j, k] = source[j, k]

@@ -14,10 +14,10 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
+from omnidyn.model.stick_slip.plant import copy_table
 from omnidyn.simulation.coulomb.events import INSTANT, YAW_SHARE, leap
 from omnidyn.simulation.coulomb.law import BOX
 from omnidyn.simulation.coulomb.stage import RHO, solve_stage, speed_along, stage_derivatives
-from omnidyn.simulation.coulomb.state import copy_table
 
 GAMMA = 0.4358665215084590  # the root of x^3 - 3 x^2 + 3/2 x - 1/6 at which SDIRK3 is L-stable
 A21, B1, B2 = (

@@ -271,7 +271,7 @@ class Environments:
             count = round(per_step)
             if count < 1 or abs(per_step - count) > EDGE * per_step:
                 raise InputError(
-                    "a step is no whole number of ticks of the speed loop",
+                    "a step is not a whole number of ticks of the speed loop",
                     got=f"{dt:g} s, {robot.drive.rate:g} Hz",
                     expected="dt times rate_Hz a whole number",
                     where="dt",

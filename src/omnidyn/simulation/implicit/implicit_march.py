@@ -115,7 +115,7 @@ def run_implicit(
 
     voltage [V] and bound, the current limit in force [A]: shape (rows, n); dt [s]: (rows,); pose: (3,). work: that of
     this plant, where it serves many runs.
-    Raises InputError where motion is so fast beside its duration that no patience would do.
+    Raises InputError where the motion is too fast to be followed in so many steps.
     """
     out = empty_outcome(len(dt), state, pose)
     step_limit = (

@@ -16,7 +16,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.layout import N_AXES, Plant, Stage, new_stage, record
-from omnidyn.model.stick_slip.plant import copy_each, copy_row, signs_differ
+from omnidyn.model.stick_slip.plant import copy_row, signs_differ
 from omnidyn.model.stick_slip.step_bound import MONOTONE
 from omnidyn.simulation.implicit.implicit_march import SIMPSON, advance_pose
 from omnidyn.simulation.slip.body import FREE, GRIPS, LINE
@@ -115,8 +115,8 @@ def run_slipping(
 ) -> SlipOutcome:
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: a step a row.
 
-    voltage [V], bound [A]: (rows, n); state (8 + 3 n,), see `rolling`. Raises InputError where motion is so fast that
-    no patience would do.
+    voltage [V], bound [A]: (rows, n); state (8 + 3 n,), see `rolling`. Raises InputError where the motion is
+    too fast to be followed in so many steps.
     """
     rows, n = len(dt), len(plant.spin)
     pose_, states, contact = (np.zeros((rows + 1, width)) for width in (3, 8 + 3 * n, n))
@@ -210,13 +210,13 @@ def _find(plant, stage, pose, h, remaining, dt, tol, room):
     while True:
         if remaining - h < 1e-9 * dt:
             h = remaining
-        copy_each(whole_step.each, now.each)
+        copy_row(whole_step.each, now.each)
         _pulled(plant, pose[2] + 0.5 * h * now.x[2], pull)
         first = slip_step(plant, stage, h, now, whole_step, room)
-        copy_each(middle.each, now.each)
+        copy_row(middle.each, now.each)
         _pulled(plant, pose[2] + 0.25 * h * now.x[2], pull)
         second = slip_step(plant, stage, 0.5 * h, now, middle, room)
-        copy_each(two.each, middle.each)
+        copy_row(two.each, middle.each)
         _pulled(plant, pose[2] + 0.25 * h * now.x[2] + 0.5 * h * middle.x[2], pull)
         third = slip_step(plant, stage, 0.5 * h, middle, two, room)
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
@@ -333,7 +333,7 @@ def _march(plant, voltage, bound, dt, loop, tol, step_limit, out, room):
                     h = max(h, tried)
                 advance_pose(pose, now.x, room.middle.x, two.x, 1.0, length, SIMPSON)
                 copy_row(now.x, two.x)
-                copy_each(now.each, two.each)
+                copy_row(now.each, two.each)
                 remaining = remaining - length if length < remaining else 0.0
                 if counts[1] > step_limit:
                     return k, capped
@@ -341,12 +341,12 @@ def _march(plant, voltage, bound, dt, loop, tol, step_limit, out, room):
             pieces = max(1, math.ceil(dt[k] * plant.steep / MONOTONE))
             for _ in range(pieces):
                 piece = dt[k] / pieces
-                copy_each(two.each, now.each)
+                copy_row(two.each, now.each)
                 _pulled(plant, pose[2] + 0.5 * piece * now.x[2], room.pull)
                 counts[0] = max(counts[0], slip_step(plant, stage, piece, now, two, room))
                 advance_pose(pose, now.x, two.x, two.x, 1.0, piece, (0.5, 0.0, 0.5, 0.0, 0.0, 0.0))
                 copy_row(now.x, two.x)
-                copy_each(now.each, two.each)
+                copy_row(now.each, two.each)
         capped += counts[0] >= SWEEPS
         _keep(now, out.state[k + 1])
         copy_row(out.pose[k + 1], pose)

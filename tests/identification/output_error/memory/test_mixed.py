@@ -1,4 +1,4 @@
-"""White noise beside errors that remember: the dense likelihood, and how well what is slow comes back."""
+"""White noise beside autocorrelated errors: the dense likelihood, and how well what is slow comes back."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Errors that remember while a robot moves: the dense likelihood, what comes back, and when they are seen."""
+"""Autocorrelated errors while a robot moves: the dense likelihood, what comes back, and when they are seen."""
 
 from itertools import pairwise
 

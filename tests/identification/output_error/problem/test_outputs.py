@@ -172,7 +172,7 @@ def test_an_axis_that_is_none_is_refused(axebot, clean):
 
 
 def test_the_noise_of_a_student_t_fit_is_a_standard_deviation(axebot, clean):
-    """Of the Gaussian noise: 2 % wild samples change it by less than what they add to the plain one."""
+    """Of the Gaussian noise: 2 % outliers change it by less than what they add to the plain one."""
     rng = np.random.default_rng(8)
     noise = rng.normal(size=clean.twist.shape) * NOISE
     fit = identify(

@@ -104,7 +104,7 @@ def test_the_profile_agrees_where_the_likelihood_is_quadratic(axebot, clean):
 
 @pytest.mark.parametrize("loss", ["gaussian", "student-t"])
 def test_a_profile_knows_of_colour(axebot, clean, loss):
-    """Errors that remember make the likelihood too steep; it is all but a parabola, so both ways say the same."""
+    """Autocorrelated errors make the likelihood too steep; it is all but a parabola, so both ways say the same."""
     keys, how = [BOX[0], BOX[4]], {"start": "rest", "loss": loss}
     log = coloured(clean, 3)
     plain = identify(log, axebot, OutputError(nuisances=(), **how)).estimate

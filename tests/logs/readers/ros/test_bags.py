@@ -99,7 +99,7 @@ def test_a_database_that_is_no_bag_says_so(tmp_path):
     with sqlite3.connect(path) as db:
         db.execute("create table people (name text)")
     db.close()
-    with pytest.raises(InputError, match=r"no ROS 2 bag; got people; expected the tables topics and messages"):
+    with pytest.raises(InputError, match=r"not a ROS 2 bag; got people; expected the tables topics and messages"):
         read_table(path)
 
 

@@ -1,9 +1,9 @@
 """How well free runs predict blocks of the logs that were not fitted: what an identified robot is used for.
 
-A likelihood asks which numbers make the next row likely, and a fit whose errors remember may follow it to numbers whose
-free run is far from the log (L. Ljung, System Identification, 16.6: simulate, and compare). So fits that a user
-did not ask for by name are compared by their free runs: each begins where the log begins, and of each block the error
-is that of a fit to all other blocks, one linear step from the fit to all.
+A likelihood asks which numbers make the next row likely, and a fit whose errors are autocorrelated may follow it to
+numbers whose free run is far from the log (L. Ljung, System Identification, 16.6: simulate, and compare). So fits that
+a user did not ask for by name are compared by their free runs: each begins where the log begins, and of each block the
+error is that of a fit to all other blocks, one linear step from the fit to all.
 """
 
 from __future__ import annotations

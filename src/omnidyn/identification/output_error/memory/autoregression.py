@@ -7,8 +7,8 @@ likelihood in terms of 1/n only: J. P. Burg, Maximum entropy spectral analysis (
 over all of them. The order has the least BIC: G. Schwarz, Ann. Stat. 6, 461 (1978).
 
 Errors of an angle or a place may add up: a push, a slip, a force that the model lacks stay in them for good. Then their
-changes from row to row are what remembers, and where they began says nothing. Taken as errors that forget, they would
-remember as long as the log lasts, and nothing in it could be told from noise.
+changes from row to row are what is autocorrelated, and where they began says nothing. Taken as errors that fade, they
+would last as long as the log does, and nothing in it could be told from noise.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ SHARE = 0.1  # of the rows that may be coefficients
 PATIENCE = 15  # orders without a better one, after which none is looked for
 MEMORY_ROWS = 20_000  # rows after which a memory is as good as endless
 CLOSEST = 1.0 - 1.0 / MEMORY_ROWS**2  # correlation of neighbours; a swing of so many rows has less
-MIXED_ORDER = 2  # order from which on white noise beside errors that remember is asked for
+MIXED_ORDER = 2  # order from which on white noise beside autocorrelated errors is asked for
 BLOCK, POWER_ERRORS = 50, 1.5  # rows; standard errors above the power of white noise from which on the same is asked
 MANY_NUMBERS = 300_000  # numbers of series, from which it pays to look for columns that say nothing new
 EMPTY = 1e-9  # of the squares of the errors themselves
@@ -46,7 +46,7 @@ class AutoRegression:
     """partial (p,): partial correlations, each within -1 to 1, so that the series is stationary. variance: of what is
     new in a row. rows: that it was fitted to. adds_up: whether all this is of the changes from row to row. slopes
     (p, q): of phi by the q numbers that it was fitted by, where these are not phi itself. moving: phi and
-    lambda of errors that remember only while the robot moves, see moving.py; all else is theirs while it does.
+    lambda of errors that are autocorrelated only while the robot moves, see moving.py; all else is theirs then.
     information (q, q): that all rows have of the q numbers, where they do not tell as much as rows without end."""
 
     partial: FloatArray
@@ -239,7 +239,7 @@ def _without_empty_axes(stretches: Sequence[FloatArray]) -> Sequence[FloatArray]
 
 
 def _of_motion(moving: Moving, rows: int) -> AutoRegression:
-    """Errors that remember in the rows that move, so many."""
+    """Autocorrelated errors in the rows that move, so many."""
     partial, slopes = told_by_many(moving.mixed)
     return AutoRegression(
         partial,

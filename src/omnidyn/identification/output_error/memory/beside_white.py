@@ -1,4 +1,4 @@
-"""Errors that remember beside noise that does not: a sensor's noise, and what a floor or an uneven force leave."""
+"""Autocorrelated errors beside white noise: a sensor's noise, and what a floor or an uneven force leave."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors that remember only while the robot moves, beside noise that does not: an uneven floor, forces of cables.
+"""Errors that are autocorrelated only while the robot moves, beside white noise: an uneven floor, forces of cables.
 
     e_t = x_t + v_t        x_t = phi x_(t-1) + w_t where the speed moves, 0 where it rests
 

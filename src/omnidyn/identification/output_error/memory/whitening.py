@@ -69,10 +69,12 @@ FEW_MEMORIES = 10.0  # memories in a log, below which the memory itself is hardl
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """A point and how far it can be trusted. solution: by filtered rows where errors remember, its solver has a
-    filtered then. plain_solution: the same point with residuals as they are. uncertainty: the trust in
-    `solution`. models: the memory of each column, none where rows are not filtered. warnings: what a reader must know
-    of that."""
+    """A point and how far it can be trusted.
+
+    solution: of filtered rows where errors are autocorrelated. plain_solution: the same point with residuals as they
+    are. uncertainty: the trust in `solution`. models: the memory of each column, none where rows are not filtered.
+    warnings: what a reader must know of that.
+    """
 
     solution: Solution
     plain_solution: Solution
@@ -101,7 +103,7 @@ def why_not(solution: Solution) -> str:
 
 
 def whitened(solution: Solution, uncertainty_before: Trust, progress: Progress = silent) -> Weighed | None:
-    """The fit anew with errors that remember; None where they do not, or where no memory makes them white.
+    """The fit anew with autocorrelated errors; None where they are white, or where no memory makes them white.
 
     solution, uncertainty_before: the fit by residuals as they are, and the trust in it.
     """
@@ -180,7 +182,7 @@ def _moved(new_solution: Solution, point_before: Point) -> float:
 
 
 def _as_readings(solution: Solution) -> Solution:
-    """The same point, its counts like any other output: rounding is a small part of errors that remember."""
+    """The same point, its counts like any other output: rounding is a small part of autocorrelated errors."""
     solver = solution.solver
     solver = Solver(solver.problem, solver.engine.unfiltered, 0.0, solver.close, counts_ticks=False)
     return replace(solution, state=solver.state(solution.state.point), solver=solver)

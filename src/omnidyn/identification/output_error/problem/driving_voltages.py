@@ -53,7 +53,7 @@ def _of_record(record: Record, robot: Robot) -> float:
 def _of_speeds(rim: FloatArray, width: int) -> tuple[FloatArray, float]:
     """(speed of each window of rows, its standard error), of speeds (rows, 3) at the rim [m/s].
 
-    Of the medians of a window, so that wild samples move nobody.
+    Of the medians of a window, so that outliers move nobody.
     """
     known_speeds = rim[:, np.isfinite(rim).all(axis=0)]
     windows = len(known_speeds) // width

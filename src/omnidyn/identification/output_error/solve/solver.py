@@ -153,7 +153,7 @@ class Solver(Generic[P]):
 
         Where the start is a state that this engine found, the logs are not marched through for it again.
         blocked_parameters (P,): latencies that a solution near by has found to stand at an edge. scales (columns,):
-        variances that it has found, of Student's t; without them least squares come first, which wild samples lead far
+        variances that it has found, of Student's t; without them least squares come first, which outliers lead far
         away.
         """
         if not self.scaled.any():

@@ -6,7 +6,7 @@ of friction, a usual fall, a limit; and, once it has found the best, the same wi
 predict blocks of the logs which they were not fitted to better than what stands, by more than a standard error, and
 that BIC prefers though they are the best of many, the simplest within a standard error of the best is taken, unless BIC
 prefers the best by far. Then the fit is diagnosed again. What no robot file holds is never taken; nor is what explains
-less than such a cause would. Before all this, where samples are wild, is a loss that bears them; and so it is later,
+less than such a cause would. Before all this, where there are outliers, is a loss that bears them; and so it is later,
 where only what is left beside a cause shows them.
 """
 

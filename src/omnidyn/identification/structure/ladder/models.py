@@ -108,7 +108,7 @@ class Model:
         return self._alone(self.solution)
 
     def answered(self) -> dict[str, Solution]:
-        """The same where an answer has it: fitted once more where errors remember."""
+        """The same where an answer has it: fitted once more where errors are autocorrelated."""
         return self._alone(self.fit.weighed(self.solution).plain_solution)
 
     def _alone(self, solution: Solution) -> dict[str, Solution]:

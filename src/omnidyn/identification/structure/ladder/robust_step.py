@@ -1,4 +1,4 @@
-"""A step where samples are wild: a fit that counts them little, before any other, for they hide causes."""
+"""A step where there are outliers: a fit that counts them little, before any other, for they hide causes."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def calmed(
     progress: FitProgress,
     gave_up: bool = False,
 ) -> tuple[Model, list[Rung]]:
-    """(the model to go on from, the rungs of a step): of Student's t where that predicts better what is not wild
-    in held-out blocks; as it stands, and no rungs, where no sample is wild, or a cause gains more.
+    """(the model to go on from, the rungs of a step): of Student's t where that predicts better what is no outlier
+    in held-out blocks; as it stands, and no rungs, where there is no outlier, or a cause gains more.
     gave_up: no such cause paid. It counts as no number of the fit."""
     remedy_by_group = {
         group: remedy

@@ -22,6 +22,7 @@ from omnidyn.model.keys import BODY_AXES, DIRECTION
 
 ZERO_SHARE = 1e-4  # of where a number began, below which there is none of it
 RIVAL = 0.3  # of what the best explains, from which another explanation is worth a look
+REMEDIES = 8  # that are told
 CHI2_MARGIN, CHI2_SHARE = 6.0, 0.05  # of chi squared, or its share, by which one must be better than the other
 
 
@@ -48,7 +49,6 @@ def remedies(
     linear: Linear,
     candidate_trials: Sequence[tuple[Candidate, list[Trial]]],
     theme_columns: Sequence[FloatArray],
-    remedy_limit: int = 8,
 ) -> tuple[Remedy, ...]:
     """The candidates that explain something, best first. theme_columns: of each piece (C, rows, K), what residuals
     follow."""
@@ -83,7 +83,7 @@ def remedies(
             best[trial_candidate.key] = candidate_result
     ranked_results = sorted(best.values(), key=lambda t: t.chi2 - penalty * t.numbers, reverse=True)
     worthy_results = [t for t in ranked_results if t.chi2 > penalty * t.numbers + 2.0 * np.log(max(len(best), 1))][
-        : 2 * remedy_limit
+        : 2 * REMEDIES
     ]
     ranking: list[tuple[Remedy, FloatArray]] = []
     for t in worthy_results:
@@ -119,7 +119,7 @@ def remedies(
         for remedy, errors_after in ranking
         if remedy.chi2 > RIVAL * worthy_results[0].chi2 and not compare_blocks(errors_after, errors_before).is_clear
     ]
-    return tuple(_best_first(kept_remedies)[:remedy_limit])
+    return tuple(_best_first(kept_remedies)[:REMEDIES])
 
 
 def _best_first(ranking: Sequence[tuple[Remedy, FloatArray]]) -> list[Remedy]:

@@ -19,7 +19,7 @@ Force = Callable[[DrivenMotion, float], FloatArray]
 WAVES = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 9.0, 12.0, 24.0)  # a turn of a wheel
 
 
-def unoffered(bench: Workbench) -> Iterator[Candidate]:
+def unoffered() -> Iterator[Candidate]:
     """All of them."""
     for key, force, sizes in (
         ("friction one way", _one_way, (0.0,)),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.errors import InputError, shortened
+from omnidyn.errors import InputError, did_you_mean, shortened
 from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.readers.recording import Recording, Track, topic_of
@@ -56,12 +55,11 @@ class Variables:
         for name in names:
             if not any(name in head for head in heads):
                 known_names = list(dict.fromkeys(part for head in heads for part in head))
-                matches = difflib.get_close_matches(name, known_names, n=1, cutoff=0.5)
                 raise InputError(
                     "no such variable",
                     got=name,
                     expected=shortened(", ".join(known_names), 300) or "a file with variables",
-                    remedy=f"did you mean {matches[0]}?" if matches else "",
+                    remedy=did_you_mean(name, known_names),
                     where=self.source,
                 )
         arrays = {variable: values for variable, values in self.arrays.items() if set(_below(variable)) & set(names)}

@@ -33,7 +33,7 @@ class Bag1File:
         """All messages in the order of the file; up to the first damage. Raises InputError as the Unpacker does."""
         try:
             if self.stream.read(len(MAGIC)) != MAGIC:
-                raise DamagedError("it is no bag of version 2.0")
+                raise DamagedError("it is not a bag of version 2.0")
             while self.stream.tell() < self.size:
                 at = self.stream.tell()
                 fields = _fields(self._read())

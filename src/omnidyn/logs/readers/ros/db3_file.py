@@ -47,7 +47,7 @@ class Db3File:
         tables = {str(name) for (name,) in db.execute("select name from sqlite_master where type = 'table'")}
         if not {"topics", "messages"} <= tables:
             raise InputError(
-                "an SQLite database that is no ROS 2 bag",
+                "an SQLite database that is not a ROS 2 bag",
                 got=", ".join(sorted(tables)[:8]) or "no tables",
                 expected="the tables topics and messages",
                 where=str(self.path),

@@ -81,7 +81,7 @@ class _FieldWalk:
         self.layout = MessageLayout(len(data), sample=data)
         if not ros1:
             if len(data) < CDR_HEAD or data[0] != 0 or data[1] > 1:
-                raise BadMessageError("no plain CDR")
+                raise BadMessageError("not plain CDR")
             self.order = "<" if data[1] else ">"
             self.layout.fixed.append((0, 2))
 

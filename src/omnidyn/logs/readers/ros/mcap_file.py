@@ -47,7 +47,7 @@ class McapFile:
                 raise DamagedError("it ends without its index" if not head else "it ends in the middle of a record")
             opcode, length = _HEAD.unpack(head)
             if opcode in (DATA_END, FOOTER):
-                self._check_end(length)
+                self._check_end()
                 return
             if length > self.size - self.stream.tell():
                 if opcode == CHUNK:
@@ -63,7 +63,7 @@ class McapFile:
             else:
                 self.stream.seek(length, 1)
 
-    def _check_end(self, length: int) -> None:
+    def _check_end(self) -> None:
         """Whether the index and the last mark are there."""
         if self.size < len(MAGIC):
             return

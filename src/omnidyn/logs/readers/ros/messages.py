@@ -111,7 +111,7 @@ class TopicReader:
                 return entry
         try:
             if len(data) > MAX_MESSAGE and self.rule is not None and self.rule.rank == 9:
-                raise BadMessageError(f"{len(data)} bytes are no plain numbers")
+                raise BadMessageError(f"{len(data)} bytes are not plain numbers")
             layout = layout_of(self.types, plain(self.connection.type), data, self.connection.form == "ros1")
         except BadMessageError as error:
             self.bad, self.last_fault = self.bad + 1, str(error)
