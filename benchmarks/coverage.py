@@ -3,8 +3,12 @@
 The tests of src/omnidyn/NAME stand in tests/NAME. They run in an order drawn at random, in a process of their own, for
 so long and no longer; one that takes long is stopped, and what it ran until then counts. So the figures are bounds from
 below. Kernels of PLAIN folders run as plain Python; those of others are compiled, and left out of the count.
-What runs in a process that a test starts is not seen. Needs the package coverage (benchmarks/peers.txt).
-`python -m benchmarks.coverage [NAME...] [--missing]` measures some folders; --missing shows the lines left over.
+What runs in a process that a test starts is not seen. Needs the package coverage, which is in no lock:
+
+    .venv/bin/python -m pip install --target /tmp/coverage coverage==7.17.5
+    PYTHONPATH=src:.:/tmp/coverage .venv/bin/python -m benchmarks.coverage [NAME ...] [--missing]
+
+measures all folders or some; --missing shows the lines left over.
 """
 
 from __future__ import annotations
@@ -132,7 +136,7 @@ def measure(
     columns = ["folder", "lines", "run", "%", "tests", "of", "cpu s"]
     table = Table("coverage: lines that the nearest tests run", columns)
     if importlib.util.find_spec("coverage") is None:
-        table.notes.append("skipped: no package coverage here, see benchmarks/peers.txt")
+        table.notes.append("skipped: the package coverage is not installed here; see benchmarks/coverage.py")
         return table
     tests = {path.name for path in (ROOT / "tests").iterdir() if path.is_dir()}
     for name in names or sorted(path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name in tests):

@@ -330,6 +330,8 @@ def test_plain_rows_and_odd_ones_give_the_same_numbers():
 
 def test_a_quoted_cell_may_hold_the_separator():
     assert parse("t,state", ['0,"a, b"', "1,c"])[0] == {"t": [0.0, 1.0], "state": ["a, b", "c"]}
+    for cell in ("b,c", "b,c,d", "b,", ",b"):
+        assert parse("t,state", [f'"0","{cell}"', '"1","c"'])[0] == {"t": [0.0, 1.0], "state": [cell, "c"]}
     assert parse("t,state", ['0,"a"', '1,"c"'])[0] == {"t": [0.0, 1.0], "state": ["a", "c"]}
 
 
@@ -338,6 +340,12 @@ def test_decimal_commas_once_certain_hold_for_all_rows():
     assert columns == {"t": [0.0, 1.0, 2.0], "u": [1.5, 0.25, 3.0]}
     assert "numbers have a decimal comma" in notes
     assert parse("t;u;s", ["0;1,5;a", "1;2,5;b,c"])[0] == {"t": [0.0, 1.0], "u": [1.5, 2.5], "s": ["a", "b,c"]}
+
+
+@pytest.mark.parametrize("row, count", [("1", 1), ("1,b,c", 3), ("b", 1)])
+def test_a_ragged_row_beside_words(row, count):
+    with pytest.raises(InputError, match=rf"log\.csv:3: row 2 has another number of cells .*; got {count}: {row}; exp"):
+        parse("t,state", ["0,a", row])
 
 
 @pytest.mark.parametrize(
@@ -411,6 +419,25 @@ def test_points_between_thousands():
     _, _, notes = parse("t;u", ["0;1.500", "1;2.500"])
     assert "points were read as decimal: 1.500 is 1.5, not 1500" in notes
     assert parse("t,u", ["0,999", "1,1.050"])[0]["u"] == [999.0, 1.05]
+
+
+@pytest.mark.parametrize("rows", [1, 2, 100])
+def test_commas_that_stay_doubtful_in_all_later_rows_are_refused(write, rows):
+    """Whole numbers, words and more such commas make nothing certain; a point shows that they are mixed."""
+    with pytest.raises(InputError, match=r"a comma in a number is ambiguous; got 1,500"):
+        list(iter_tables(write("t;u\n0;1,500\n1;2\n2;3,250\n"), rows))
+    with pytest.raises(InputError, match=r"decimal commas and decimal points are mixed; got 1,500 and 2\.5"):
+        list(iter_tables(write("t;u\n0;1,500\n1;7\n2;2.5\n"), rows))
+    tables = list(iter_tables(write("t;u\n0;1,500\n1;7\n2;2,5\n"), rows))
+    assert np.concatenate([part.columns["u"] for part in tables]).tolist() == [1.5, 7.0, 2.5]
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_points_between_thousands_in_pieces(write, rows):
+    """A block of whole numbers says as much as a row of them."""
+    assert [part.columns["u"][-1] for part in iter_tables(write("t;u\n0;1000\n1;1.050\n"), rows)][-1] == 1.05
+    with pytest.raises(InputError, match="a point in a number is ambiguous"):
+        list(iter_tables(write("t;u\n0;999\n1;1.050\n"), rows))
 
 
 # ---- the value ------------------------------------------------------------------------------------------------------
