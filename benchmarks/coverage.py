@@ -37,7 +37,7 @@ PACKAGE = ROOT / "src" / "omnidyn"
 PLAIN = ("model", "simulation")  # their kernels run as plain Python
 KERNELS = ("part", "kernel", "maker", "branching_kernel")  # what makes a function of compiled/kernel.py
 TEST_S = {True: 3.0, False: 15.0}  # [s] of processor time for a test, where kernels are plain and where not
-FOLDER_S = 40.0  # for all tests of a folder
+FOLDER_S = 300.0  # for all tests of a folder
 GOAL = 90.0  # %
 SEED = 1
 

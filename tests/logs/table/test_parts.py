@@ -272,6 +272,16 @@ def test_what_ends_every_row():
     assert found.cells("2,3", "") == ["2", "3"]
 
 
+def test_a_head_need_not_end_as_the_rows_do():
+    """Names and units without the semicolon of each row: told where enough rows follow."""
+    rows = "".join(f"\n{k},{2 * k};" for k in range(7))
+    found = layout("Time,Voltage\nt,u\ns,V" + rows)
+    assert (found.names, found.first, found.ending) == (("t", "u"), 4, ";")
+    assert found.notes[-1] == "every row ends with a semicolon: it was left out"
+    assert layout("t,u\ns,V" + rows).ending == ";"
+    assert layout("t,u" + rows).ending == ";"
+
+
 def test_a_row_index_gets_a_name():
     assert layout(",t\n0,5\n1,6").names == ("index", "t")
     for rows in ("1,5\n2,6", "0,5\n2,6"):
@@ -476,6 +486,9 @@ def test_cells_that_are_missing():
     with pytest.raises(InputError, match=r"log\.csv:3, column u: not a number; got x"):
         found.numbers("u")
     assert found.text("u") == ("1", "x", "2")
+    late = table(columns={"t": np.zeros(3), "u": ("1", "2", "3")})  # a block of a column that began with words
+    with pytest.raises(InputError, match=r"log\.csv:2, column u: not a number; got 1;"):
+        late.numbers("u")
     with pytest.raises(InputError, match=r"log\.csv:2, column t: not text; got 0\.0; expected text"):
         found.text("t")
     assert not found.own_clocks
@@ -582,6 +595,48 @@ def test_what_is_no_text(write):
     with pytest.raises(InputError, match="bytes that are no text"):
         lines_of(write(mostly))
     assert lines_of(write(b"\x01" * 200 + b"abcdefgh" * 100))[1].last == 1  # one in five
+
+
+@pytest.mark.parametrize(
+    "content, words",
+    [
+        (b"\0" + b"\1" * 9 + b"a" * 990, "zero bytes in it"),  # less than one in a hundred is a control character
+        (b"\0" + b"\1" * 11 + b"a" * 988, "bytes that are no text"),
+        (b"\1" * 29 + b"a" * 71, None),  # three in ten
+        (b"\1" * 31 + b"a" * 69, "bytes that are no text"),
+        (b"\1" + b"\xff" * 28 + b"a" * 71, None),
+        (b"\1" + b"\xff" * 30 + b"a" * 69, "bytes that are no text"),
+        (b"\xff" * 50 + b"a" * 50, None),  # no control character
+        (b"\xff" * 50 + b"a" * 49 + b"\x7f", "bytes that are no text"),
+    ],
+)
+def test_how_much_a_text_may_hold_that_is_none(write, content, words):
+    if words is None:
+        assert lines_of(write(content))[1].last == 1
+    else:
+        with pytest.raises(InputError, match=words):
+            lines_of(write(content))
+
+
+def test_the_first_eight_bytes_are_shown(write):
+    with pytest.raises(InputError, match=r"\(it begins with 01 02 03 04 05 06 07 08\);"):
+        lines_of(write(bytes(range(1, 9)) * 20))
+
+
+def test_a_file_may_be_as_long_as_its_limit(write):
+    path = write("t,u\n0,1\n")
+    assert len(list(TextFile(path, max_bytes=8).blocks(10))) == 1
+    with pytest.raises(InputError, match="the file is too large; got more than 7 bytes"):
+        list(TextFile(path, max_bytes=7).blocks(10))
+    with pytest.raises(InputError, match="the file is empty"):
+        list(TextFile(write("")).blocks(10))
+
+
+def test_four_letters_of_two_bytes_tell_an_encoding(write):
+    assert lines_of(write("t,ab".encode("utf-16-le")))[1].notes == ["the encoding is UTF-16-LE"]
+    assert lines_of(write("t,ab".encode("utf-16-be")))[1].notes == ["the encoding is UTF-16-BE"]
+    with pytest.raises(InputError, match="zero bytes in it"):
+        lines_of(write("t,a".encode("utf-16-le") + b"b"))
 
 
 def test_what_was_read_is_reported(write):
