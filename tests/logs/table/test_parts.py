@@ -353,7 +353,9 @@ def test_decimal_commas_once_certain_hold_for_all_rows():
 
 
 @pytest.mark.parametrize("row, count", [("1", 1), ("1,b,c", 3), ("b", 1)])
-def test_a_ragged_row_beside_words(row, count):
+def test_a_ragged_row_beside_words(write, row, count):
+    with pytest.raises(InputError, match=rf"table\.csv:4: row 3 has another number of cells .*; got {count}: {row}; e"):
+        list(iter_tables(write(f"t,state\n0,a\n1,b\n{row}\n"), 1))
     with pytest.raises(InputError, match=rf"log\.csv:3: row 2 has another number of cells .*; got {count}: {row}; exp"):
         parse("t,state", ["0,a", row])
 
@@ -637,6 +639,13 @@ def test_four_letters_of_two_bytes_tell_an_encoding(write):
     assert lines_of(write("t,ab".encode("utf-16-be")))[1].notes == ["the encoding is UTF-16-BE"]
     with pytest.raises(InputError, match="zero bytes in it"):
         lines_of(write("t,a".encode("utf-16-le") + b"b"))
+
+
+def test_utf_16_that_ends_within_a_letter_is_refused(write):
+    whole = "t,u\n0,1".encode("utf-16")
+    assert lines_of(write(whole))[0] == [(1, ["t,u", "0,1"])]
+    with pytest.raises(InputError, match=r"not a text file; got no valid UTF-16"):
+        lines_of(write(whole[:-1]))
 
 
 def test_what_was_read_is_reported(write):
