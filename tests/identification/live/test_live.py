@@ -8,7 +8,7 @@ import omnidyn
 from omnidyn.identification.live.rows import Rows, part
 from omnidyn.identification.live.status import LiveNumber, LiveStatus
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.model.keys import BOX
+from omnidyn.model.keys import BOX, Key
 from tests.support.axebot_logs import NOISE, TRUTH, coloured, noisy, voltages, with_friction
 
 SECONDS = 30.0
@@ -48,6 +48,12 @@ def test_numbers_are_those_of_the_fit_of_the_whole_log(live, log):
     whole = whole_fit(log, live.method)
     for name, number in live.status.numbers.items():
         assert abs(number.value - whole[name]) < 0.3 * number.std, name
+
+
+def test_the_robot_of_now_has_the_numbers_of_now(live):
+    assert omnidyn.Live(WRONG).robot_now == WRONG
+    for name in BOX:
+        assert Key.parse(name).get(live.robot_now) == pytest.approx(live.status.numbers[name].value, rel=1e-12)
 
 
 def test_a_drive_ends_with_the_whole_fit_where_errors_remember(exact):
