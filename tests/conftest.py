@@ -1,6 +1,7 @@
 """Hypothesis profiles and the robots that many tests share.
 
-OMNIDYN_HYPOTHESIS=thorough tries 50 times as many examples, and other ones in each run.
+OMNIDYN_HYPOTHESIS=thorough tries 50 times as many examples, and other ones in each run. Without --long, Hypothesis
+tries a third as many as with it, and studies of many draws take as small a share of them (`draws`).
 """
 
 import gc
@@ -37,7 +38,7 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.register_profile("thorough", settings.get_profile("ci"), max_examples=3000, derandomize=False)
-settings.load_profile(os.environ.get("OMNIDYN_HYPOTHESIS", "ci"))
+settings.register_profile("short", settings.get_profile("ci"), max_examples=20)
 
 
 BEGUN, LAST_LONG = time.monotonic(), 45  # [min] from then on; on most machines all have ended by then
@@ -49,7 +50,8 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
-    """Processor times are counted where a file is named for them."""
+    """How many examples Hypothesis tries; processor times are counted where a file is named for them."""
+    settings.load_profile(os.environ.get("OMNIDYN_HYPOTHESIS", "ci" if config.getoption("--long") else "short"))
     if config.getoption(OPTION) is not None:
         config.pluginmanager.register(ProcessorTimes(config.getoption(OPTION)))
 
@@ -72,6 +74,16 @@ def pytest_runtest_setup(item):
     """No long study is begun late: a slow machine ends all other tests in time."""
     if item.get_closest_marker("long") and time.monotonic() - BEGUN > 60 * LAST_LONG:
         pytest.skip(f"a long study, and {LAST_LONG} minutes have passed: run it by itself")
+
+
+@pytest.fixture(scope="session")
+def draws(pytestconfig):
+    """How many draws of a study are made: all of them with --long, else a third, under the same bounds."""
+
+    def number(of_study):
+        return of_study if pytestconfig.getoption("--long") else -(-of_study // 3)
+
+    return number
 
 
 @pytest.fixture

@@ -72,6 +72,7 @@ def test_groups_of_one_name_are_refused():
         outputs(Out("", "x.toml", True, False), ["a b", "a-b"])
 
 
+@pytest.mark.long  # of a log without noise; test_result_first.py has it of a short one
 def test_a_page_that_cannot_be_drawn_costs_no_fit(call, driven, monkeypatch):
     import omnidyn.report.fit_page as page
 

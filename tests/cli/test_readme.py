@@ -15,7 +15,11 @@ from omnidyn.model.robot_file import load_robot
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text("utf-8")
-EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+LONG = "from_log_to_motion"  # how-to/from-log-to-motion.md and the case study go the same way, and are tested
+EXAMPLES = [
+    pytest.param(path, marks=[pytest.mark.long] if path.stem == LONG else [], id=path.stem)
+    for path in sorted((ROOT / "examples").glob("*.py"))
+]
 
 
 def blocks(language):
@@ -55,19 +59,37 @@ def test_the_first_screen_says_what_it_is_for_which_robots_and_how_to_start():
     assert len(README.split()) <= 700
 
 
-def test_the_commands_on_a_log_print_what_stands_below_them(tmp_path, monkeypatch, capsys):
-    """And what they find holds what is true (examples/my_robot/README.md)."""
+@pytest.fixture
+def your_log(tmp_path, monkeypatch, capsys):
+    """Run commands of that section in a folder with its logs: what they print."""
     from omnidyn.cli import main
 
     for file in (ROOT / "examples" / "my_robot").glob("*.csv"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
     monkeypatch.chdir(tmp_path)
-    part = README[README.index("## Your log") : README.index("## What it does")]
-    said = ""
-    part = re.sub(r"\\\n\s+", "", part)
-    for line in re.findall(r"^    omnidyn (.*)$", part, re.MULTILINE):
-        assert main(shlex.split(line)) == 0, capsys.readouterr().err
-        said += capsys.readouterr().out
+    part = re.sub(r"\\\n\s+", "", README[README.index("## Your log") : README.index("## What it does")])
+
+    def run(*names):
+        lines = re.findall(r"^    omnidyn (.*)$", part, re.MULTILINE)
+        commands = [words for words in map(shlex.split, lines) if words[0] in (names or words)]
+        assert {words[0] for words in commands} == set(names or ("init", "check", "identify"))
+        said = ""
+        for words in commands:
+            assert main(words) == 0, capsys.readouterr().err
+            said += capsys.readouterr().out
+        return said
+
+    return run
+
+
+def test_the_check_of_a_log_prints_what_stands_below_it(your_log):
+    assert blocks("text")[0].strip() in your_log("init", "check")
+
+
+@pytest.mark.long
+def test_the_commands_on_a_log_print_what_stands_below_them(your_log, tmp_path):
+    """And what they find holds what is true (examples/my_robot/README.md)."""
+    said = your_log()
     for text in blocks("text")[:2]:
         for line in text.splitlines():
             assert line in said
@@ -125,11 +147,15 @@ def test_every_command_that_it_and_the_page_name_exists():
     assert set(re.findall(r"`omnidyn ([a-z]+)", README)) <= known
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
-def test_every_example_runs(tmp_path, example):
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_every_example_runs(tmp_path, monkeypatch, capsys, example):
+    """In this process, where warnings are errors too: the block above is the first of them in its own."""
     for extra in re.findall(r"^from (stable_baselines3) import", example.read_text("utf-8"), re.MULTILINE):
         pytest.importorskip(extra)  # in no lock: it is large
-    assert run([str(example)], tmp_path).stdout
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", [str(example)])
+    runpy.run_path(str(example), run_name="__main__")
+    assert capsys.readouterr().out
 
 
 def test_the_tables_of_the_examples_are_read():

@@ -38,7 +38,7 @@ FAILURES = [
     ("page", "termination"),
     pytest.param("diagnosis", "termination", marks=pytest.mark.long),
     pytest.param("comparison with the logs", "memory", marks=pytest.mark.long),
-    pytest.param("page", "bug", marks=pytest.mark.long),
+    ("page", "bug"),
 ]
 
 

@@ -73,7 +73,7 @@ def copy(tmp_path_factory):
 def fresh(folder, **environment):
     """The numbers of SCRIPT from a new process that uses the package in `folder`."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
-    clean |= {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"} | environment
+    clean |= {"PYTHONPATH": str(folder)} | environment
     done = subprocess.run([sys.executable, "-c", SCRIPT], env=clean, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
@@ -119,9 +119,8 @@ def test_an_edited_formula_is_compiled_anew(copy, before):
 
 def test_without_a_writable_folder_it_compiles_in_memory(copy, tmp_path):
     """A file stands wherever numba would make a folder: works for root too, whom no permission stops."""
-    shutil.copytree(copy / "omnidyn", tmp_path / "omnidyn")
+    shutil.copytree(copy / "omnidyn", tmp_path / "omnidyn", ignore=shutil.ignore_patterns("__pycache__"))
     for source in (tmp_path / "omnidyn").rglob("*.py"):
-        (source.parent / "__pycache__").unlink(missing_ok=True)
         (source.parent / "__pycache__").touch()
     blocked = tmp_path / "blocked"
     blocked.touch()

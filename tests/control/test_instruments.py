@@ -1,6 +1,7 @@
 """Sensors that a loop simulates show what a real robot measures, and what they show costs controllers little."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -157,6 +158,15 @@ def test_a_robot_is_driven_by_what_it_measures(name, spec, limit):
     assert ("pose missing: bridged" in found.statuses) == ("dropouts" in spec)
 
 
+GOAL = "goal:x_m=0.8,y_m=0.4,heading_rad=1.2,travel_s=2,hold_s=1"
+
+
+@cache
+def steadily(name, sensors):
+    """By a loop that does not tremble."""
+    return omnidyn.track(AXEBOT, GOAL, name, sensors=sensors)
+
+
 @pytest.mark.parametrize("name", ["pid", "mpc", "speed"])
 @pytest.mark.parametrize("spec", ["jitter:2ms", "jitter:5ms", "missed:5%", "encoder,pose,jitter:5ms,missed:5%"])
 def test_a_loop_that_trembles_or_misses_a_step_costs_little(name, spec):
@@ -164,9 +174,8 @@ def test_a_loop_that_trembles_or_misses_a_step_costs_little(name, spec):
 
     Who sees no pose keeps what a step of another length costs: 2 mm.
     """
-    goal = "goal:x_m=0.8,y_m=0.4,heading_rad=1.2,travel_s=2,hold_s=1"
-    steady = omnidyn.track(AXEBOT, goal, name, sensors=spec.partition("jitter")[0].strip(",") or None)
-    trembling = omnidyn.track(AXEBOT, goal, name, sensors=spec, rng=2)
+    steady = steadily(name, spec.partition("jitter")[0].strip(",") or None)
+    trembling = omnidyn.track(AXEBOT, GOAL, name, sensors=spec, rng=2)
     blind = 2e-3 if name == "speed" else 0.0
     assert trembling.rmse_position < max(1.3 * steady.rmse_position, steady.rmse_position + 1e-4 + blind)
     assert trembling.rmse_heading < max(1.3 * steady.rmse_heading, steady.rmse_heading + 2e-4 + blind)

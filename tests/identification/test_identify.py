@@ -113,11 +113,11 @@ def test_a_longer_log_is_asked_for_against_noise_only(right):
     assert ("a longer log does not help" in words) is not right
 
 
-def test_a_fit_to_200_logs_without_noise_that_overlap_ends():
+def test_a_fit_to_200_logs_without_noise_that_overlap_ends(draws):
     robot = load_robot("axebot")
     voltage = np.repeat(np.random.default_rng(0).uniform(-6.0, 6.0, (100, 3)), 25, axis=0)
     run = simulate(robot, voltage, 0.02)
-    cuts = [slice(k * 10, k * 10 + 400) for k in range(200)]
+    cuts = [slice(k * 10, k * 10 + 400) for k in range(draws(200))]
     runs = [
         Run(t=run.t[cut], voltage=run.voltage[cut], wheel_speed=run.wheel_speed[cut], source=f"log{k}.csv")
         for k, cut in enumerate(cuts)

@@ -18,6 +18,7 @@ from omnidyn.model.frames import world_to_body
 from tests.support.exported import STRICT
 
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+QUICK, OPTIMISED = "-O0", "-O2"  # the second takes a compiler five times as long behind sanitizers
 _MAIN = """
 #include "omnidyn_control.h"
 
@@ -60,21 +61,33 @@ def sanitizers() -> tuple[str, ...]:
         return SANITIZERS if made.returncode == 0 else ()
 
 
+@cache
+def program(sources: tuple[tuple[str, str], ...], level: str) -> bytes:
+    """These files and `main.c` as a program, compiled once in a process."""
+    with tempfile.TemporaryDirectory() as folder:
+        for name, text in (*sources, ("main.c", _MAIN)):
+            (Path(folder) / name).write_text(text, "utf-8")
+        command = ["gcc", *STRICT, level, *sanitizers(), "-o", "control", "main.c", "omnidyn_control.c", "-lm"]
+        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+        return (Path(folder) / "control").read_bytes()
+
+
 class CController:
     """A controller in C, beside the one of Python from which it was made (`own`). A context."""
 
     info = Info("in C")
+    level = QUICK  # of optimisation; tests/export/conftest.py has another for --long
 
     def __init__(self, robot, folder: Path, controller: Any = "pid", dt: float = 0.02) -> None:
-        omnidyn.export.c_controller(robot, controller=controller, dt=dt).write(folder)
-        (folder / "main.c").write_text(_MAIN)
-        command = ["gcc", *STRICT, *sanitizers(), "-o", "control", "main.c", "omnidyn_control.c", "-lm"]
-        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+        made = omnidyn.export.c_controller(robot, controller=controller, dt=dt)
         self.own: Any = controller_named(controller, robot, dt=dt)
         self.own._gate.judge = lambda t, state: TRUSTED  # C takes measurements as they are
         self.name, self.robot = f"{self.own.name}_c", robot
         self.output, self.limit = self.own.output, self.own.limit
         self._program = folder / "control"
+        folder.mkdir(parents=True, exist_ok=True)
+        self._program.write_bytes(program(tuple(sorted(made.files.items())), self.level))
+        self._program.chmod(0o755)
         self._begin()
 
     def _begin(self) -> None:

@@ -50,7 +50,7 @@ def motor_of(log):
     return motor
 
 
-@pytest.mark.parametrize("seed", [1, 4])
+@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.long), 4])
 def test_a_dead_band_is_kept_beside_a_block_that_rules_the_sum(seed):
     """By the sum of squares it was dropped, and the viscous friction was 279 and 278 N s/m."""
     motor = motor_of(axis_log(seed))

@@ -22,7 +22,7 @@ def reaches():
     return RATE * np.maximum(AT - T, 0.0)
 
 
-def share(speed, put_in, stop, noise, draws=200):
+def share(speed, put_in, stop, noise, draws):
     held, width = [], []
     for seed in range(draws):
         noisy = speed + noise * np.random.default_rng(seed).standard_normal(len(T))
@@ -35,14 +35,14 @@ def share(speed, put_in, stop, noise, draws=200):
 
 
 @pytest.mark.parametrize("jump", [0.0, 0.3], ids=["creeps off", "jumps off"])
-def test_the_interval_holds_the_start(jump):
-    held, width = share(leaves(jump), RATE * T, False, 0.02)
+def test_the_interval_holds_the_start(jump, draws):
+    held, width = share(leaves(jump), RATE * T, False, 0.02, draws(200))
     assert held >= 0.92
     assert width < 0.15
 
 
-def test_the_interval_holds_the_stop():
-    held, width = share(reaches(), RATE * (1.0 - T), True, 0.02)
+def test_the_interval_holds_the_stop(draws):
+    held, width = share(reaches(), RATE * (1.0 - T), True, 0.02, draws(200))
     assert held >= 0.92
     assert width < 0.1
 

@@ -41,9 +41,9 @@ def test_a_bend_of_the_line_moves_no_start():
 
 
 @pytest.mark.parametrize("how", [{}, {"noise": 0.5}, {"ticks": 400}, {"ticks": 2000}], ids=str)
-def test_the_intervals_hold_the_truth(how):
+def test_the_intervals_hold_the_truth(how, draws):
     """Two draws of each; bench studies has many."""
-    found = coverage([STICKY, EQUAL], 2, ALL, **how)
+    found = coverage([STICKY, EQUAL], draws(2), ALL, **how)
     assert min(found.values()) >= 0.75
 
 

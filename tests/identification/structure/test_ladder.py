@@ -85,6 +85,7 @@ def assert_switched_on(estimate, true, key):
     assert held(estimate, true) >= 5
 
 
+@pytest.mark.long  # that such a frame is taken is tested above, of speeds
 def test_no_ladder_ends_calm_on_a_fit_that_its_answer_finds_wrong():
     """Of counts: a fit that takes errors for white leaves drifts, and what looks wild; one that knows their memory
     finds the forces of a turning frame, as the answer without the ladder does."""
@@ -140,6 +141,7 @@ def test_a_pull_in_the_room_is_taken_as_one_of_these_logs():
     assert estimate.robot.log.tilt == pytest.approx((2.3, 0.0), abs=0.1)
 
 
+@pytest.mark.long  # that it is not offered is tested below
 def test_what_no_robot_file_holds_is_said_and_not_taken():
     run, robot, _ = world("sag", 0.2)
     estimate = identify(run, robot, OutputError(free=FREE, ladder=True)).estimate

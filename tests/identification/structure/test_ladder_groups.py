@@ -174,6 +174,7 @@ def test_blocks_of_groups_are_those_of_one_fit_where_all_is_each_groups_own(give
     assert (together.rows, together.numbers) == (sum(each.rows for each in parts), 12)
 
 
+@pytest.mark.long  # another shape, and one of a group, are taken above and in test_ladder.py
 def test_an_ellipse_gets_a_level_for_each_wheel():
     """Three unequal wheels beside an ellipse, under the file of an ellipse."""
     case = right_case(7101).setup_but(sensor=SPEEDS, memory=0.0, rate=50.0, seconds=20.0)

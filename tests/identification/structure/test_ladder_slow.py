@@ -52,6 +52,7 @@ def test_behind_what_leaves_only_noise_rivals_alone_are_tried(rolls):
     assert [(each.move, each.reason) for each in purse.untried()] == [(far, NOT_NEEDED_NOTE)]
 
 
+@pytest.mark.long  # the rule itself is tested above
 def test_a_wrong_mass_under_wild_samples_needs_no_fit_of_wheels_that_slip(monkeypatch):
     """A grip is among the remedies: fits of it, by Student's t, took more than ten minutes."""
     made, raw = [], Fit.solve

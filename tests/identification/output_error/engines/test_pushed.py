@@ -59,7 +59,7 @@ def problem_of(robot, run):
 def test_residuals_and_slopes(robot):
     """Residuals beside simulate, which shares the step but neither derivatives nor how a log turns the force; slopes by
     differences."""
-    run = a_log(robot, PUSH, TILT)
+    run = a_log(robot, PUSH, TILT, duration=3.0)
     problem = problem_of(robot, run)
     values = dict(zip([f"push.{axis}" for axis in ("x", "y", "yaw")], PUSH, strict=True))
     values |= dict(zip(["tilt.x", "tilt.y"], TILT, strict=True))

@@ -196,7 +196,7 @@ def test_two_floors_share_the_gains(looped):
 def test_groups_find_the_latency_of_currents_behind_a_slow_loop(looped):
     """No descent crosses a tick of 20 ms: each group alone tries one after the other, and so must all together."""
     slow = looped.replace(drive=looped.drive.replace(rate=50.0))
-    runs = [log(slow, seed, late=23) for seed in (1, 2)]
+    runs = [log(slow, seed, 300, late=23) for seed in (1, 2)]
     for own in ((), ("friction", "latency.current")):
         found = identify(runs, slow, OutputError(per_free=own, nuisances=("latency",)), groups=["a", "b"])
         for estimate in found.groups.values():

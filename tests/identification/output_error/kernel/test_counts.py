@@ -93,11 +93,11 @@ def test_the_pull_of_a_row_without_noise_is_the_sum_of_its_harmonics():
     assert curvature == pytest.approx(1.0 - np.mean(spread), rel=1e-4)
 
 
-def test_without_noise_the_spread_of_the_draws_is_what_a_fit_says(axebot, rolled):
+def test_without_noise_the_spread_of_the_draws_is_what_a_fit_says(axebot, rolled, draws):
     """Rows at rest repeat one another: a sandwich over blocks shorter than a rest says 1.3 times too little."""
     run, angle = rolled
     z = []
-    for seed in range(40):
+    for seed in range(draws(40)):
         counted = ticks_of(angle, 2.0 * np.pi / 512, np.random.default_rng(seed), 0.0)
         log = Run(t=run.t, voltage=run.voltage, wheel_angle=counted)
         fit = identify(log, axebot, OutputError(nuisances=(), start="rest")).estimate
@@ -108,7 +108,7 @@ def test_without_noise_the_spread_of_the_draws_is_what_a_fit_says(axebot, rolled
     assert 0.85 < np.sqrt(np.mean(sizes**2)) < 1.15
 
 
-def test_the_spread_of_a_product_is_what_a_fit_says_though_its_factors_are_guesses(axebot, rolled):
+def test_the_spread_of_a_product_is_what_a_fit_says_though_its_factors_are_guesses(axebot, rolled, draws):
     """Torque constant and gear are known to 15 %, what they push together to 0.1 %: all but nothing of their std.
 
     With the std of each factor raised to what rounding alone makes of it, that of the product was 1.4 times too small.
@@ -117,7 +117,7 @@ def test_the_spread_of_a_product_is_what_a_fit_says_though_its_factors_are_guess
     factors = ("motor.torque_constant_Nm_A", "motor.gear_ratio", "motor.resistance_ohm")
     guess = {key: Prior(std=0.15 * float(Key.parse(key).get(axebot)), origin="guess") for key in factors}
     z = []
-    for seed in range(40):
+    for seed in range(draws(40)):
         counted = ticks_of(angle, 2.0 * np.pi / 512, np.random.default_rng(seed), 0.0)
         log = Run(t=run.t, voltage=run.voltage, wheel_angle=counted)
         fit = identify(

@@ -13,11 +13,11 @@ from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import TRUTH, voltages
 
 
-def test_a_body_that_is_pushed_along_the_floor_says_less_of_that_and_no_less_of_turning(axebot):
+def test_a_body_that_is_pushed_along_the_floor_says_less_of_that_and_no_less_of_turning(axebot, draws):
     """Scatter of Coulomb friction over its standard error, 20 logs: 1.3 and 0.4 where wheels count as apart."""
     clean = simulate(axebot, voltages(np.random.default_rng(11)), 0.01)
     to_wheels, errors = np.linalg.lstsq(clean.twist, clean.wheel_speed)[0], []
-    for seed in range(20):
+    for seed in range(draws(20)):
         rng = np.random.default_rng(seed)
         slow = lfilter([1.0], [1.0, -0.95], 0.0125 * rng.normal(size=clean.twist.shape) * [1.0, 1.0, 0.0], axis=0)
         speed = clean.wheel_speed + slow @ to_wheels + 0.4 * rng.normal(size=clean.wheel_speed.shape)

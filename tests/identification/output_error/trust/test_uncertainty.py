@@ -143,7 +143,7 @@ def test_bootstrap_over_runs(axebot):
         identify(runs[0], axebot, OutputError(nuisances=(), bootstrap=10))
 
 
-def test_what_differs_from_run_to_run_is_in_the_intervals(axebot):
+def test_what_differs_from_run_to_run_is_in_the_intervals(axebot, draws):
     """25 short runs, Coulomb friction of each 15 % off at random; the truth is their expected value.
 
     40 draws: errors in standard errors scatter by 1, within three counting errors of 40; by white noise they
@@ -152,7 +152,7 @@ def test_what_differs_from_run_to_run_is_in_the_intervals(axebot):
     rng, key = np.random.default_rng(5), "friction.axes.coulomb[0]"
     base = voltages(np.random.default_rng(3))[:100]
     errors = {"auto": [], "white": []}
-    for _ in range(40):
+    for _ in range(draws(40)):
         runs = []
         for level in TRUTH[key] * (1.0 + 0.15 * rng.normal(size=25)):
             run = simulate(Key.parse(key).set(axebot, float(level)), base, 0.01)
