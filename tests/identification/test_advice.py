@@ -7,7 +7,7 @@ import numpy as np
 from omnidyn.identification.advice import advice
 from omnidyn.identification.estimate import Correlation
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
-from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.prepare import guesses
 from omnidyn.identification.stability import Stability
 from omnidyn.model.robot import Prior
@@ -18,11 +18,12 @@ DISC = Remedy("friction.direction", quoted("friction along the direction of trav
 WHEELS = Remedy("friction.wheels", quoted("friction at each wheel"), 0.4, 0.1, share=0.9, chi2=900.0)
 MASS = Remedy("body.mass_kg", quoted("another mass, 2.1 kg"), 0.5, 0.1, ("gain",), share=0.95, chi2=1000.0)
 GAIN = Remedy("gain", quoted("voltages 0.8 times those logged"), 0.5, 0.1, ("body.mass_kg",), share=0.95, chi2=999.0)
+FADE = Remedy("fade", quoted("a voltage that fades by 8 %"), 0.6, 0.1, share=0.99, chi2=1200.0)
 SAG = Remedy("sag", quoted("a supply that sags under load"), 0.6, 0.1, share=0.99, offered=False, chi2=1200.0)
 
 
-def missing(*remedies):
-    """What is advised where these would mend the model."""
+def missing(*remedies, nuisances=()):
+    """What is advised where these would mend the model. nuisances: names of what was fitted beside the robot."""
     lack = LackOfFit(True, {"vx": 0.5}, {"vx": 0.1}, (), remedies, {})
     fit = OutputErrorEstimate(
         robot=load_robot("axebot"),
@@ -31,6 +32,7 @@ def missing(*remedies):
         ci95={},
         correlation=Correlation((), np.eye(0)),
         degrees_of_freedom={},
+        nuisances={name: Nuisance(0.01, 0.001, (0.008, 0.012), "s") for name in nuisances},
         study=lambda: Diagnosis(lack, {}, Stability({}, ())),
     )
     return [each for each in advice(fit, None) if each.code == "missing_cause"]
@@ -63,6 +65,14 @@ def test_numbers_that_a_file_gives_as_exact_are_doubted_where_the_model_does_not
     (two,) = held(robot.replace(priors={"body.inertia_kg_m2": Prior(std=0.1)}), value=["motor.resistance_ohm"])
     assert two.numbers["keys"] == ("motor.torque_constant_Nm_A",)
     assert not any(each.code == "held_numbers" for each in held(robot, missed=()))
+
+
+def test_a_nuisance_is_asked_for_beside_those_that_are_fitted():
+    """An option that names one leaves out the others: without its latency the next fit had a wrong rotor."""
+    (one,) = missing(FADE, nuisances=["latency.twist", "gain"])
+    assert str(one).endswith("fit it (`nuisances` latency.twist `nuisances` gain `nuisances` fade)")
+    (alone,) = missing(FADE)
+    assert str(alone).endswith("fit it (`nuisances` fade)")
 
 
 def test_of_remedies_that_explain_the_same_only_the_first_is_advised():

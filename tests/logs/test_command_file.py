@@ -141,6 +141,26 @@ def test_other_kinds_of_commands_are_told_by_their_columns(tmp_path, kind):
         _ = held.voltage
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_run_file_is_a_command_file_and_what_was_measured_is_not_used(tmp_path, kind):
+    text, wheels = KINDS[kind]
+    names, *rows = text.splitlines()
+    beside = [*(f"a{k + 1}_rad" for k in range(wheels)), "vx_m_s", "omega_rad_s"]
+    lines = [",".join([names, *beside]), *(f"{row}," + "1.5," * wheels + ",0.2" for row in rows)]
+    (tmp_path / "c.csv").write_text(text)
+    (tmp_path / "run.csv").write_text("\n".join(lines) + "\n")
+    alone, held = read_commands(tmp_path / "c.csv", wheels), read_commands(tmp_path / "run.csv", wheels)
+    assert (held.kind, held.rows.tolist(), held.dt.tolist()) == (kind, alone.rows.tolist(), alone.dt.tolist())
+    assert (held.supply is None) == (kind != "duty")
+    assert any("is not used: a1_rad" in str(note) for note in held.notes)
+
+
+def test_a_log_as_it_was_recorded_is_sent_to_the_commands_that_read_it(tmp_path):
+    (tmp_path / "log.csv").write_text("stamp_ms,duty1,duty2,duty3,enc1\n0,0,0,0,7\n10,0,0,0,7\n")
+    with pytest.raises(InputError, match=r"no commands by their names; .*`compare`.*`convert`"):
+        read_commands(tmp_path / "log.csv", 3)
+
+
 def test_a_duty_file_for_another_number_of_wheels_is_refused(tmp_path):
     (tmp_path / "c.csv").write_text(KINDS["duty"][0])
     with pytest.raises(InputError, match=r"another number of wheels.*d4_duty"):

@@ -74,6 +74,7 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[Statement]:
             "same_as": remedy.same_as,
             "alike": lack.alike(remedy),
             "way": next_action(remedy),
+            "nuisances": tuple(fit.nuisances),
         }
         yield Statement("missing_cause", NOTE, remedy.key, numbers | remedy.largest_changes())
     best = next(iter(lack.causes), None)

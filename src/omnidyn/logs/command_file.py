@@ -1,7 +1,8 @@
 """Command files: CSV (or Parquet) `t_s,u1_V,u2_V,...`, each row holding until the next. The input of a simulation.
 
 Volts, or in their place a duty `d1_duty,...` (with or without `supply_V`), wheel speeds `w1_cmd_rad_s,...` or a twist
-`vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s` for drives that take them: the columns of a run file.
+`vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s` for drives that take them: the columns of a run file. So a run file is one too;
+what was measured is not used.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.run_file import columns_of, refuse_other_units
 from omnidyn.logs.table.table import FileTable
+from omnidyn.run import CHANNELS
 from omnidyn.statement import Statement
 
 MAX_STEPS = 10_000_000
@@ -75,7 +77,7 @@ def read_commands(
         raise InputError("cannot simulate for that long", got=duration, expected="a duration above 0 s")
     table = read_table(path)
     kind = next((kind for kind in KINDS if _numbered(table, kind)), KINDS[0])
-    _check_columns(table, kind, wheels)
+    unused_columns = _check_columns(table, kind, wheels)
     if len(table) > max_steps:
         raise InputError(
             "too many rows",
@@ -86,10 +88,12 @@ def read_commands(
         )
     t = table.measured("t_s")
     rows = np.stack([table.measured(name) for name in columns_of(kind, wheels)], axis=1)
-    supply = table.measured("supply_V") if "supply_V" in table.names else None
+    supply = table.measured("supply_V") if kind == "duty" and "supply_V" in table.names else None
     _check_time(table, t)
     dt, row_count = _intervals(table, t, duration)
     notes = table.notes
+    if unused_columns:
+        notes = (*notes, f"what a run file has beside its commands is not used: {', '.join(unused_columns)}")
     if row_count < len(t):
         notes = (*notes, f"{len(t) - row_count} rows begin after the duration: left out")
     battery = None if supply is None else supply[:row_count]
@@ -104,11 +108,18 @@ def _numbered(table: FileTable, kind: str) -> list[str]:
     return [name for name in table.names if re.fullmatch(pattern, name)]
 
 
-def _check_columns(table: FileTable, kind: str, wheels: int) -> None:
+def _check_columns(table: FileTable, kind: str, wheels: int) -> list[str]:
+    """The columns of a run file that stand beside the commands, which nothing is made of.
+
+    Raises InputError for columns of neither, of another number of wheels, and for a log as it was recorded.
+    """
     expected = ["t_s", *columns_of(kind, wheels)]
     optional = ["supply_V"] if kind == "duty" else []
+    of_run = [name for channel in CHANNELS for name in columns_of(channel, wheels)]
+    unused_columns = [name for name in table.names if name in of_run and name not in (*expected, *optional)]
     input_columns = _numbered(table, kind)
-    strangers = len(table.names) - len(input_columns) - sum(name in table.names for name in ("t_s", *optional))
+    known_names = (*input_columns, "t_s", *optional, *unused_columns)
+    strangers = [name for name in table.names if name not in known_names]
     if "t_s" in table.names and input_columns and not strangers and len(input_columns) != len(expected) - 1:
         raise InputError(
             "the file is for another number of wheels",
@@ -117,8 +128,17 @@ def _check_columns(table: FileTable, kind: str, wheels: int) -> None:
             remedy="take the robot and the file that belong together",
             where=table.source,
         )
-    table.check_names(expected, optional)
+    if strangers and not input_columns:
+        raise InputError(
+            "holds no commands by their names",
+            got=", ".join(table.names),
+            expected=", ".join([*expected, *optional]),
+            remedy="a log is replayed by `compare`, and gets these names by `convert`",
+            where=table.source,
+        )
+    table.check_names(expected, [*optional, *unused_columns])
     refuse_other_units(table)
+    return unused_columns
 
 
 def _check_time(table: FileTable, t: FloatArray) -> None:

@@ -11,7 +11,6 @@ from omnidyn.telling.sentence import Sentence
 
 LONGEST_FACTOR = 100.0  # times as long as now: nobody records more
 WAYS = {  # what to do about a cause
-    "fit": "fit it (`nuisances` {key})",
     "look": "look what happened there; fit the parts as logs of their own",
     "limit": 'put about that value into the robot file, {name} = {{ value = .., origin = "guess" }}, and fit again',
     "measure": "measure it and put it into the robot file",
@@ -52,6 +51,9 @@ def _how_to(statement: Statement) -> str:
         group = {place.name if (place := find_key(name)) else name for name in (key, *statement.numbers["same_as"])}
         ways = [words for name, words in MEASURED.items() if name in group] or ["measure one of them"]
         return f"{' or '.join(ways)}, or record what tells them apart (currents, another load)"
+    if kind == "fit":  # with what is fitted already: an option that names one nuisance leaves out all others
+        names = [*statement.numbers["nuisances"], key]
+        return f"fit it ({' '.join(f'`nuisances` {name}' for name in names)})"
     return WAYS[kind].format(key=key, name=key.rpartition(".")[2])
 
 

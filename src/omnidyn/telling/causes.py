@@ -25,6 +25,7 @@ UNOFFERED = {
     "pull": "a constant pull, by a floor that is not level or an offset of sensors",
     "turning left and right": "another level turning left than right",
 }
+NUISANCE_UNITS = {"dead_band": "V", "tilt.x": "N", "tilt.y": "N", "push.x": "N", "push.y": "N", "push.yaw": "N m"}
 NO_REST = 1e-3  # of what a number was, below which nothing is left of it
 SHAPES = {DIRECTION: "an ellipse", BODY_AXES: "a box"}
 
@@ -64,7 +65,10 @@ def _fitted(statement: Statement) -> str:
     found = []
     for name, value in zip(statement.numbers["keys"], statement.numbers["values"], strict=True):
         key, _, group = name.partition("@")
-        found.append(f"{in_words(key)} {value:.3g} {unit(key)}".rstrip() + (f" in {group}" if group else ""))
+        words = in_words(key) if find_key(key) else key.replace("_", " ")
+        found.append(
+            f"{words} {value:.3g} {NUISANCE_UNITS.get(key) or unit(key)}".rstrip() + (f" in {group}" if group else "")
+        )
     return all_of(found)
 
 

@@ -209,6 +209,10 @@ SENTENCES = {
     "side_of_gear": Sentence(
         "speeds of wheels are on the {side} side: the commands are {ratio:.4g} times those of the body"
     ),
+    "side_by_name": Sentence(
+        "{columns:,} are counts of a turn of the motor, before the gear, as their names say; those of a turn of the "
+        "wheel are ticks/COUNTS@wheel"
+    ),
     "one_motor": Sentence(
         either(
             "numbered",

@@ -8,6 +8,7 @@ from omnidyn.document import all_of, short
 from omnidyn.model.keys import in_words
 from omnidyn.sensors import COUNTED
 from omnidyn.statement import Statement
+from omnidyn.telling.causes import NUISANCE_UNITS
 from omnidyn.telling.lack_of_fit import names_of
 from omnidyn.telling.sentence import Sentence
 
@@ -21,7 +22,6 @@ EXPLANATIONS = {  # that are no numbers of a robot file
     "tilt": "a tilted floor",
     "push": "a push on the body",
 }
-NUISANCE_UNITS = {"dead_band": "V", "tilt.x": "N", "tilt.y": "N", "push.x": "N", "push.y": "N", "push.yaw": "N m"}
 LIMIT_UNITS = {"current": " A", "heat": " W", "traction": ""}
 LEFT_OUT = {  # why a plan leaves out moves
     "room": "would leave the room",

@@ -15,6 +15,8 @@ from omnidyn.run import Run
 ROWS, DT, TICK = 1000, 0.01, 2.0 * np.pi / 1440.0
 MOST = 60  # 274 before
 
+DEAD = 0.5  # [V] of a dead band
+
 
 @pytest.fixture(scope="module")
 def counts():
@@ -40,6 +42,18 @@ def test_a_fit_of_counts_takes_few_simulations(counts):
     for name, truth in truths.items():
         key = f"friction.direction.{name}"
         assert abs(estimate.value[key] - truth) < 4.0 * estimate.std[key], key
+
+
+def test_a_dead_band_of_the_driver_is_fitted_where_it_is_there(counts):
+    """Nobody asked for it: beside a fit that marches it was never tried, and friction and motor made up for it."""
+    guess, world, log = counts
+    behind_band = log.replace(voltage=log.voltage + DEAD * np.sign(log.voltage))
+    fit = Fit.of([behind_band], guess, OutputError())
+    (estimate,) = fit.answer(fit.solve()).estimates.values()
+    assert estimate.nuisances["dead_band"].value == pytest.approx(DEAD, rel=0.02)
+    for name, truth in zip(("coulomb[0]", "coulomb[1]", "yaw_coulomb"), world.coulomb, strict=True):
+        assert estimate.value[f"friction.direction.{name}"] == pytest.approx(truth, rel=0.02), name
+    assert "driver_dead_band" in [statement.code for statement in estimate.warnings]
 
 
 def test_no_constant_force_is_fitted_where_all_outputs_add_up(counts):

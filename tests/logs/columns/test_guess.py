@@ -314,6 +314,19 @@ def test_commands_tell_the_side_of_the_gear(tmp_path):
         assert columns.columns["w1_cmd"].side == side
 
 
+def test_counts_that_a_name_puts_before_the_gear_are_said_to_be_there(tmp_path):
+    """`m1` may be motor 1 as well as wheel 1: taken in silence, every angle was off by the gear ratio."""
+    table = table_of(tmp_path, {"t_s": clock(0.01), **{f"m{k}_ticks": np.arange(ROWS) for k in (1, 2, 3)}})
+    columns = guess_columns(table, assume={"a": "ticks/48"})
+    assert columns.columns["a1"].side == "motor"
+    (note,) = (note for note in said(columns.notes) if "m1_ticks" in note)
+    assert "ticks/COUNTS@wheel" in note
+    for side in ("motor", "wheel"):
+        settled = guess_columns(table, assume={"a": f"ticks/48@{side}"})
+        assert settled.columns["a1"].side == side
+        assert not any("m1_ticks" in note for note in said(settled.notes))
+
+
 def test_an_assumed_unit_may_say_the_side_of_the_gear(tmp_path):
     """It was refused as an unknown unit; only a column of its own could have a side."""
     table = table_of(tmp_path, {"t_s": clock(0.01), "enc1": np.arange(ROWS), "enc2": np.arange(ROWS), "w1": 2.0})

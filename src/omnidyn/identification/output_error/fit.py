@@ -58,10 +58,12 @@ from omnidyn.identification.output_error.written_fit import (
     beside_given,
     best_with_force,
     better_of,
+    better_with_dead_band,
+    gains_much,
     screened,
     why_white,
 )
-from omnidyn.model.actuation import GAIN
+from omnidyn.model.actuation import DEAD_BAND, GAIN
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
 from omnidyn.progress import silent
@@ -331,12 +333,16 @@ class Fit:
         return len(self.groups) == 1 and not self.groups[0].engine.has_loop and not self.nu
 
     def _chosen(self, solution: Solution, progress: FitProgress) -> Solution:
-        """The fit of the only group, or the plain one; with a constant force where errors are not white and it pays."""
+        """The fit of the only group, or the plain one; with a dead band or a constant force where errors are not white
+        and it pays."""
         if not self._chooses:
             return solution
         chosen_solution = better_of(solution, self._plain(solution, progress))
+        if _is_white(chosen_solution):
+            return chosen_solution
+        chosen_solution = self._with_dead_band(solution, chosen_solution, progress)
         adds_up = chosen_solution.solver.problem.travels.all()  # then no force is taken
-        if adds_up or trust(chosen_solution.solver, chosen_solution, AUTO).kind != SANDWICH:
+        if adds_up or _is_white(chosen_solution):
             return chosen_solution
         inner_progress = progress.aside("once more with a constant force")
         try:
@@ -347,6 +353,21 @@ class Fit:
         except UnsupportedError:  # an engine that knows no constant force
             return chosen_solution
         return best_with_force(chosen_solution, screened(chosen_solution, begun_fits, inner_progress))
+
+    def _with_dead_band(self, solution: Solution, chosen_solution: Solution, progress: FitProgress) -> Solution:
+        """The chosen fit, or one with a dead band of the driver beside the nuisances of `solution`, where that pays.
+
+        An exact engine has it from the start; of one that marches each number more takes its time, so first
+        a score test (C. R. Rao, 1948) says whether the likelihood asks for it: one simulation, no step.
+        """
+        names = solution.solver.problem.nuisances
+        if DEAD_BAND in names or self.groups[0].engine.exact:
+            return chosen_solution
+        inner_progress = progress.aside("once more with a dead band")
+        begun_fit = self.beside(solution, [*names, DEAD_BAND], inner_progress, limit=0)
+        if not gains_much(begun_fit):
+            return chosen_solution
+        return better_with_dead_band(chosen_solution, begun_fit.gone_on(inner_progress))
 
     def _plain(self, solution: Solution, progress: FitProgress) -> Solution:
         """The fit of the only group without nuisances, but for the gain of a nominal supply; the fit itself where it
@@ -485,6 +506,11 @@ class Fit:
         kind = question.covariance
         uncertainty = trust(solution.solver, solution, SANDWICH if kind == AUTOREGRESSIVE else kind)
         return find_breakaway(solution, names, uncertainty, progress)
+
+
+def _is_white(solution: Solution) -> bool:
+    """Whether the errors of a fit remember nothing."""
+    return trust(solution.solver, solution, AUTO).kind != SANDWICH
 
 
 def _in_each_group(names: Iterable[str], problem: Problem) -> list[str]:

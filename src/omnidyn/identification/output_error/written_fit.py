@@ -19,8 +19,9 @@ from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.linear.free_run import FreeRun, free_run, margins_of
 from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.problem.parameters import AT
-from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.output_error.solve.solver import Normal, Solution
 from omnidyn.identification.output_error.trust.uncertainty import trust
+from omnidyn.model.actuation import DEAD_BAND
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress
 from omnidyn.statement import NOTE, WARNING, Statement
@@ -93,6 +94,35 @@ def best_with_force(solution: Solution, forced_solutions: Sequence[Solution]) ->
     }
     notes = (*solution.notes, Statement("constant_force", WARNING, numbers=numbers))
     return replace(forced_solutions[k], plain_solution=solution.plain_solution, notes=notes)
+
+
+def gains_much(begun_fit: Solution) -> bool:
+    """Whether the likelihood of a fit that has taken no step would grow by FORCE_GAIN, as far as its slopes tell."""
+    normal = Normal(begun_fit.solver, begun_fit.state)
+    return 0.5 * normal.distance_without(normal.held) >= FORCE_GAIN
+
+
+def better_with_dead_band(solution: Solution, banded_solution: Solution) -> Solution:
+    """A fit, or the one with a dead band of the driver where that is seen and predicts clearly better.
+
+    Angles that add up count: unlike a constant force, a dead band does not make up for errors that drift.
+    """
+    margins = margins_of([solution, banded_solution])
+    own_run, banded_run = free_run(solution, margins), free_run(banded_solution, margins)
+    comparison = banded_run.improvement(own_run)
+    if comparison is None:
+        return solution
+    j = banded_solution.solver.problem.where(DEAD_BAND)
+    value = float(banded_solution.state.point.values[j])
+    try:
+        std = trust(banded_solution.solver, banded_solution, AUTO).std[j]
+    except np.linalg.LinAlgError:  # the logs do not tell it from the other numbers
+        return solution
+    if not value > FORCE_ERRORS * std:
+        return solution
+    numbers = {"value": value, "error": own_run.error, "with": banded_run.error, **comparison.counts}
+    notes = (*solution.notes, Statement("driver_dead_band", WARNING, numbers=numbers))
+    return replace(banded_solution, plain_solution=solution.plain_solution, notes=notes)
 
 
 def why_white(white: Solution, weighed_fit: Weighed) -> Statement | None:

@@ -24,7 +24,7 @@ from omnidyn.logs.columns.component import (
 )
 from omnidyn.logs.columns.doubts import Doubt, doubt, joined_doubts, letter_of
 from omnidyn.logs.columns.frame_of import FRAMES
-from omnidyn.logs.columns.guess_side import settle_side, take_sides
+from omnidyn.logs.columns.guess_side import note_sides_by_name, settle_side, take_sides
 from omnidyn.logs.columns.guess_time import take_time
 from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, unit_of, voltage_limit
 from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
@@ -89,6 +89,7 @@ def guess_columns(
     _ask_where_motion_differs(table, numbers, guess)
     settle_side(table, robot, guess)
     take_sides({name: side for name, (_, side) in declared.items() if side}, guess)
+    note_sides_by_name({name for name, (_, side) in declared.items() if not side}, guess)
     _refuse_twins(table, guess, taken or {})
     guess.doubts = [open_doubt for open_doubt in guess.doubts if open_doubt.columns[0] not in (taken or {})]
     used_names = {column.name for column in guess.columns.values()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import replace
 
 import numpy as np
@@ -50,6 +50,22 @@ def take_sides(sides: Mapping[str, str], guess: Guess) -> None:
         for name in (component.rstrip("0123456789"), component, column.name):
             if name in sides:
                 guess.columns[component] = replace(guess.columns[component], side=sides[name])
+
+
+def note_sides_by_name(counted_names: Set[str], guess: Guess) -> None:
+    """Notes counts that stand before the gear by the name of their column alone.
+
+    counted_names: of columns, components or letters whose counts per turn the user says, but no side.
+    """
+    columns = [
+        column.name
+        for component, column in guess.columns.items()
+        if column.side == MOTOR_SIDE
+        and column.unit.startswith("ticks")
+        and counted_names & {component.rstrip("0123456789"), component, column.name}
+    ]
+    if columns:
+        guess.note("side_by_name", columns=columns)
 
 
 def _values(table: FileTable, columns: list[Column | None]) -> FloatArray:
