@@ -288,6 +288,12 @@ SENTENCES = {
         "look for a floor that is not level, a cable, a brush, or voltages that are off by a constant; friction that "
         "is not the same both ways looks alike",
     ),
+    "dead_band_fitted": Sentence(
+        "the driver has a dead band of {values[0]:.3g} V that is not that of the robot file: with it a free run misses "
+        "{with:%.3g} % of the spread of the outputs on held-out blocks of the log, {error:%.3g} % without ({better} "
+        "of {blocks} blocks are predicted better)",
+        "see at which input each motor starts to turn, both ways, and write it into the robot file",
+    ),
     "plain_predicts_better": Sentence(
         "the fit without {nuisances} predicts {better} of {blocks} held-out blocks of the log better (a free run "
         "misses {plain:%.3g} % of the spread of the outputs, {error:%.3g} % with them): they are not fitted"

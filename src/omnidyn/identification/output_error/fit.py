@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -56,12 +57,12 @@ from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE
 from omnidyn.identification.output_error.written_fit import (
     SCREENING_STEPS,
     beside_given,
-    best_with_force,
+    best_with_cause,
     better_of,
     screened,
     why_white,
 )
-from omnidyn.model.actuation import GAIN
+from omnidyn.model.actuation import DEAD_BAND, GAIN
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
 from omnidyn.progress import silent
@@ -331,22 +332,22 @@ class Fit:
         return len(self.groups) == 1 and not self.groups[0].engine.has_loop and not self.nu
 
     def _chosen(self, solution: Solution, progress: FitProgress) -> Solution:
-        """The fit of the only group, or the plain one; with a constant force where errors are not white and it pays."""
+        """The fit of the only group, or the plain one; with a constant force where errors are not white and it pays, or
+        with a dead band, which is tried from the start where that costs next to nothing."""
         if not self._chooses:
             return solution
         chosen_solution = better_of(solution, self._plain(solution, progress))
         adds_up = chosen_solution.solver.problem.travels.all()  # then no force is taken
         if adds_up or trust(chosen_solution.solver, chosen_solution, AUTO).kind != SANDWICH:
             return chosen_solution
-        inner_progress = progress.aside("once more with a constant force")
-        try:
-            names = chosen_solution.solver.problem.nuisances
-            begun_fits = [
-                self.beside(chosen_solution, [*names, force], inner_progress, SCREENING_STEPS) for force in (PUSH, TILT)
-            ]
-        except UnsupportedError:  # an engine that knows no constant force
-            return chosen_solution
-        return best_with_force(chosen_solution, screened(chosen_solution, begun_fits, inner_progress))
+        causes = [PUSH, TILT] if self.groups[0].engine.exact else [PUSH, TILT, DEAD_BAND]
+        inner_progress = progress.aside("once more with a constant force or a dead band")
+        begun_fits = []
+        for cause in causes:
+            with suppress(UnsupportedError):  # an engine that knows none
+                names = [*chosen_solution.solver.problem.nuisances, cause]
+                begun_fits.append(self.beside(chosen_solution, names, inner_progress, SCREENING_STEPS))
+        return best_with_cause(chosen_solution, screened(chosen_solution, begun_fits, inner_progress))
 
     def _plain(self, solution: Solution, progress: FitProgress) -> Solution:
         """The fit of the only group without nuisances, but for the gain of a nominal supply; the fit itself where it

@@ -21,14 +21,15 @@ from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.uncertainty import trust
+from omnidyn.model.actuation import DEAD_BAND
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress
 from omnidyn.statement import NOTE, WARNING, Statement
 
-FORCE_ERRORS = 3.0  # standard errors by which a constant force is one
-SCREENING_STEPS = 3  # of a fit with a constant force, before it is known whether it pays
-FORCE_GAIN = 0.5 * FORCE_ERRORS**2  # of the likelihood, below which a constant force is none
-FORCE_SHARE = 0.5  # of what the better one gains: a constant force that gains less predicts no better
+CAUSE_ERRORS = 3.0  # standard errors by which a constant force or a dead band is one
+SCREENING_STEPS = 3  # of a fit with one, before it is known whether it pays
+CAUSE_GAIN = 0.5 * CAUSE_ERRORS**2  # of the likelihood, below which it is none
+CAUSE_SHARE = 0.5  # of what the best one gains: one that gains less predicts no better
 
 
 def better_of(solution: Solution, plain_solution: Solution) -> Solution:
@@ -52,47 +53,46 @@ def better_of(solution: Solution, plain_solution: Solution) -> Solution:
 
 
 def screened(solution: Solution, begun_fits: Sequence[Solution], progress: Progress) -> list[Solution]:
-    """The fits with a constant force each that may be taken, at their ends. begun_fits: after some steps."""
+    """The fits with one more cause each that may be taken, at their ends. begun_fits: after some steps."""
     gains = [solution.state.objective - begun_fit.least_objective for begun_fit in begun_fits]
-    least_gain = max(FORCE_GAIN, FORCE_SHARE * max(gains))
+    least_gain = max(CAUSE_GAIN, CAUSE_SHARE * max(gains, default=0.0))
     pairs = zip(begun_fits, gains, strict=True)
     return [begun_fit.gone_on(progress) for begun_fit, gain in pairs if gain >= least_gain]
 
 
-def best_with_force(solution: Solution, forced_solutions: Sequence[Solution]) -> Solution:
-    """A fit, or the one of `forced_solutions`, which have a constant force each, that predicts best and clearly better.
+def best_with_cause(solution: Solution, solutions_with_cause: Sequence[Solution]) -> Solution:
+    """A fit, or the one with a constant force or a dead band beside its numbers that predicts best and clearly better.
 
     A step from the fit without does not see it: dry friction takes up to as much, and the numbers have gone elsewhere.
     """
-    if not forced_solutions:
+    if not solutions_with_cause:
         return solution
-    margins = margins_of([solution, *forced_solutions])
-    run_without_force, runs = (
-        free_run(solution, margins),
-        [free_run(forced_solution, margins) for forced_solution in forced_solutions],
-    )
+    margins = margins_of([solution, *solutions_with_cause])
+    run_without = free_run(solution, margins)
+    runs = [free_run(solution_with_cause, margins) for solution_with_cause in solutions_with_cause]
     k = int(np.argmin([run.error for run in runs]))
-    comparison = runs[k].improvement(run_without_force)
-    if run_without_force.adds_up or comparison is None:
+    comparison = runs[k].improvement(run_without)
+    if run_without.adds_up or comparison is None:
         return solution
-    problem, values = forced_solutions[k].solver.problem, forced_solutions[k].state.point.values
-    force_indices = [problem.where(name) for name in problem.names if name not in solution.solver.problem.names]
+    problem, values = solutions_with_cause[k].solver.problem, solutions_with_cause[k].state.point.values
+    indices = [problem.where(name) for name in problem.names if name not in solution.solver.problem.names]
     try:
-        std = trust(forced_solutions[k].solver, forced_solutions[k], AUTO).std
-    except np.linalg.LinAlgError:  # the logs do not tell the force from the other numbers
+        std = trust(solutions_with_cause[k].solver, solutions_with_cause[k], AUTO).std
+    except np.linalg.LinAlgError:  # the logs do not tell it from the other numbers
         return solution
-    if not (np.abs(values[force_indices]) > FORCE_ERRORS * std[force_indices]).any():
+    if not (np.abs(values[indices]) > CAUSE_ERRORS * std[indices]).any():
         return solution
-    names = tuple(problem.names[j] for j in force_indices)
+    names = tuple(problem.names[j] for j in indices)
     numbers = {
         "keys": names,
-        "values": tuple(values[force_indices].tolist()),
-        "error": run_without_force.error,
+        "values": tuple(values[indices].tolist()),
+        "error": run_without.error,
         "with": runs[k].error,
         **comparison.counts,
     }
-    notes = (*solution.notes, Statement("constant_force", WARNING, numbers=numbers))
-    return replace(forced_solutions[k], plain_solution=solution.plain_solution, notes=notes)
+    code = "dead_band_fitted" if names == (DEAD_BAND,) else "constant_force"
+    notes = (*solution.notes, Statement(code, WARNING, numbers=numbers))
+    return replace(solutions_with_cause[k], plain_solution=solution.plain_solution, notes=notes)
 
 
 def why_white(white: Solution, weighed_fit: Weighed) -> Statement | None:
