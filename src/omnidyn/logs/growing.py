@@ -1,8 +1,8 @@
 """A text file that is still being written: its rows as Runs, as they come.
 
 Only whole lines are taken. Which column is what is decided once, from the first rows; what stands above them belongs to
-all. Later a line that holds no row (half written, binary), and rows without numbers, are left out and counted. Rows that
-were written a little late are sorted; those that belong before rows that were given out already are left out and
+all. Later a line that holds no row (half written, binary), and rows without numbers, are left out and counted. Rows
+that were written a little late are sorted; those that belong before rows that were given out already are left out and
 counted. A clock that begins anew begins a Run of its own.
 """
 
