@@ -162,7 +162,7 @@ def wheel_table(logs: Run | Sequence[Run], robot: Robot) -> WheelTable:
     """The table of wheels whose asked and measured speeds were logged, by steady stretches: a line for each direction.
 
     Wheels are measured by their speeds or angles, else by the twist that they make. Raises InputError where no speeds
-    were asked for, or a wheel turns the other way than it is asked to, InsufficientDataError where a wheel does not turn
+    were asked for, or a wheel turns the other way than it is asked to; InsufficientDataError where one does not turn
     both ways with two speeds or more, each held for half a second.
 
     >>> import omnidyn
@@ -219,8 +219,8 @@ def _refuse_turned_round(asked: FloatArray, turned: FloatArray) -> None:
             got=", ".join(wrong),
             expected="gains above 0",
             remedy="look at the wheel: where it does turn the other way, swap the wires of its motor, the sign in its "
-            "driver, or its azimuth in the robot file by 180 degrees; where only its encoder counts the other way, read "
-            "its column with a minus (`column` w2=-NAME); then write the table again",
+            "driver, or its azimuth in the robot file by 180 degrees; where only its encoder counts the other way, "
+            "read its column with a minus (`column` w2=-NAME); then write the table again",
             where="logs",
         )
 
