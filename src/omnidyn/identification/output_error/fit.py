@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -57,10 +56,9 @@ from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE
 from omnidyn.identification.output_error.written_fit import (
     SCREENING_STEPS,
     beside_given,
-    best_with_cause,
     better_of,
-    screened,
     why_white,
+    with_cause,
 )
 from omnidyn.model.actuation import DEAD_BAND, GAIN
 from omnidyn.model.known.told import known_priors
@@ -342,12 +340,12 @@ class Fit:
             return chosen_solution
         causes = [PUSH, TILT] if self.groups[0].engine.exact else [PUSH, TILT, DEAD_BAND]
         inner_progress = progress.aside("once more with a constant force or a dead band")
-        begun_fits = []
-        for cause in causes:
-            with suppress(UnsupportedError):  # an engine that knows none
-                names = [*chosen_solution.solver.problem.nuisances, cause]
-                begun_fits.append(self.beside(chosen_solution, names, inner_progress, SCREENING_STEPS))
-        return best_with_cause(chosen_solution, screened(chosen_solution, begun_fits, inner_progress))
+        names = chosen_solution.solver.problem.nuisances
+
+        def begin(cause: str) -> Solution:
+            return self.beside(chosen_solution, [*names, cause], inner_progress, SCREENING_STEPS)
+
+        return with_cause(chosen_solution, causes, begin, inner_progress)
 
     def _plain(self, solution: Solution, progress: FitProgress) -> Solution:
         """The fit of the only group without nuisances, but for the gain of a nominal supply; the fit itself where it

@@ -8,11 +8,13 @@ fit: friction and what is free, white noise, no nuisances. So the plain fit stan
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
+from omnidyn.errors import UnsupportedError
 from omnidyn.identification.estimate import HeldOut
 from omnidyn.identification.methods import AUTO
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
@@ -50,6 +52,20 @@ def better_of(solution: Solution, plain_solution: Solution) -> Solution:
     return replace(
         plain_solution, notes=(*solution.notes, Statement("plain_predicts_better", WARNING, numbers=numbers))
     )
+
+
+def with_cause(
+    solution: Solution, causes: Sequence[str], begin: Callable[[str], Solution], progress: Progress
+) -> Solution:
+    """A fit, or the one with one of these causes beside its numbers that predicts best and clearly better.
+
+    begin: takes the first steps of the fit with a cause; raises UnsupportedError where no engine knows that.
+    """
+    begun_fits = []
+    for cause in causes:
+        with suppress(UnsupportedError):
+            begun_fits.append(begin(cause))
+    return best_with_cause(solution, screened(solution, begun_fits, progress))
 
 
 def screened(solution: Solution, begun_fits: Sequence[Solution], progress: Progress) -> list[Solution]:
