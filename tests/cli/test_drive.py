@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.errors import InputError
+from omnidyn.driving.guard import DriveGuard
+from omnidyn.errors import InputError, Terminated
 
 ROWS = [[0.0, 0.0, 0.0]] * 20 + [[0.0, 3.0, -3.0]] * 40 + [[0.0] * 3] * 20 + [[0.0, -3.0, 3.0]] * 40 + [[0.0] * 3] * 20
 
@@ -93,6 +94,20 @@ def test_what_it_does_not_take(call, here, commands, arguments, words):
     code, _, err = call("drive", *arguments)
     assert code == 3
     assert words in err
+
+
+@pytest.mark.parametrize(("error", "code"), [(IndexError("of ours"), 1), (Terminated(), 143)])
+def test_an_error_on_the_way_is_told_when_the_log_is_written(call, here, commands, monkeypatch, error, code):
+    fault = DriveGuard.fault
+
+    def fail(guard, now):
+        if now > 1.3:
+            raise error
+        return fault(guard, now)
+
+    monkeypatch.setattr(DriveGuard, "fault", fail)
+    assert call("drive", commands, "--robot", "axebot", "-o", "log.csv")[0] == code
+    assert len(omnidyn.read_log(here / "log.csv", robot=omnidyn.load_robot("axebot"))) == pytest.approx(50, abs=4)
 
 
 @pytest.mark.parametrize("json_", [False, True])

@@ -2,8 +2,9 @@
 
 from types import SimpleNamespace
 
-from omnidyn.cli.identify_brief import brief
+from omnidyn.cli.identify_brief import brief, with_plan
 from omnidyn.cli.terminal.telling import BRIEF_LINES
+from omnidyn.document import Document
 from omnidyn.identification.planning.got import Got
 from omnidyn.statement import ERROR, WARNING, quoted
 
@@ -45,3 +46,19 @@ def test_an_interval_much_wider_than_planned_is_named_first():
     as_planned = {keys[0]: Got(0.0002, 0.0003, 0.00098), keys[1]: Got(float("inf"), float("inf"), 0.1)}
     assert "as planned" not in brief(found, {"": as_planned}).to_text()
     assert "140 times as wide" in brief(found, {"": {keys[0]: Got(0.0001, 0.0003, 0.014)}}).to_text()
+
+
+def test_an_interval_much_wider_than_planned_is_told_to_machines():
+    """As data, and on stderr with the warnings of the fit."""
+    key = "motor.resistance_ohm"
+    told = with_plan(Document((), {"ok": True}, ["of the fit"]), {"": {key: Got(0.0002, 0.0003, 0.014)}})
+    (warning,) = told.data["planned_warnings"]
+    assert (warning["code"], warning["subject"], warning["severity"]) == ("wider_than_planned", key, WARNING)
+    assert "70 times as wide as planned" in warning["text"]
+    assert warning["text"] in [str(said) for said in told.warnings]
+    assert told.data["planned"][""][key]["got"] == 0.014
+    as_planned = with_plan(Document((), {}), {"": {key: Got(0.01, 0.01, 0.014)}})
+    assert (as_planned.data["planned_warnings"], as_planned.warnings) == ([], [])
+    groups = {"carpet": {key: Got(0.001, 0.001, 0.1)}, "tiles": {key: Got(0.01, 0.01, 0.01)}}
+    (of_carpet,) = with_plan(Document((), {}), groups).data["planned_warnings"]
+    assert of_carpet["text"].startswith("carpet: ")

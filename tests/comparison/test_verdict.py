@@ -54,8 +54,17 @@ def test_components_of_one_kind_apart_where_they_differ():
 def test_white_errors_are_noise_whatever_their_share():
     (each,) = followed({"i1": Score(0.2, 40.0, 0.3)})
     assert each.level == NOISE
-    assert str(each.statement()) == "currents as far as noise lets it (60 %)"
+    assert str(each.statement()) == "currents as far as the noise allows (60 %)"
     assert followed({"i1": Score(0.2, 90.0, 0.3)})[0].level == WELL
+
+
+def test_white_errors_that_are_larger_than_what_moves_are_mere_noise():
+    scores = {"x": Score(0.012, -64.0, 0.3), "w1": Score(0.2, 99.0)}
+    noise = "there is mere noise in position (rms error 0.012 m)"
+    assert str(follows("the model", followed(scores))) == f"the model follows wheel speeds within 1 %; {noise}"
+    assert str(follows("the model", followed({"x": scores["x"]}))) == f"the model has nothing to follow; {noise}"
+    hardly = {"x": scores["x"], "w1": Score(0.2, 40.0)}
+    assert str(follows("the model", followed(hardly))) == f"the model follows wheel speeds hardly (60 %); {noise}"
 
 
 def test_what_never_changes_cannot_be_followed():

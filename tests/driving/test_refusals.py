@@ -94,7 +94,7 @@ def test_a_log_without_inputs_is_refused_and_one_of_no_time_leaves_all():
 
 
 def test_a_supply_that_was_never_a_number_is_recorded():
-    recording = DriveRecording()
+    recording = DriveRecording(3)
     for k in range(3):
         recording.measured(0.1 * k, Measured(0.1 * k, 1, k, {"supply": np.array([np.nan])}))
         recording.sent(0.1 * k, Command(1, k, 0.1 * k, 0.1, (0.1, 0.1, 0.1)))

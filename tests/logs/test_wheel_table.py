@@ -87,6 +87,21 @@ def test_logs_that_do_not_tell_are_refused(run, words):
         omnidyn.wheel_table(run(), LEKIWI)
 
 
+@pytest.mark.parametrize(
+    ("signs", "wheels"),
+    [
+        ([1.0, -1.0, 1.0], r"wheel 2 \(gain -0\.9\d\)"),
+        ([-1.0, -1.0, -1.0], r"wheel 1 \(gain -0\.8\d\), wheel 2 .*, wheel 3 "),
+    ],
+)
+def test_wheels_that_turn_the_other_way_are_named(signs, wheels):
+    run = driven([0.6, 1.5, 2.5, 3.5])
+    run = run.replace(wheel_speed=run.wheel_speed * signs)
+    words = f"a wheel turns the other way than it is asked to; got {wheels}.*; expected gains above 0; .*`column`"
+    with pytest.raises(omnidyn.OmnidynError, match=words):
+        omnidyn.wheel_table(run, LEKIWI)
+
+
 @pytest.mark.parametrize("channel", ["wheel_speed", "wheel_speed_command", "wheel_angle"])
 @pytest.mark.parametrize("levels", [[1.0, 2.0], [0.6, 1.5, 2.5]])
 def test_the_log_of_another_robot_is_refused(channel, levels):

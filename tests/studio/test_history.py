@@ -292,3 +292,13 @@ def test_a_fit_says_which_part_of_how_many_it_is_at_and_what_the_last_one_took(s
     fitting.last.spent = 14.0
     asyncio.run(fitting.run())
     assert fitting.last.before == 14.0
+
+
+def test_a_fit_warns_of_an_interval_much_wider_than_planned(tmp_path):
+    log = {"path": str(write_log(tmp_path / "log.csv", 4.0)), "name": "log.csv", "map": "", "unsigned": False}
+    request = {"robot": "axebot", "logs": [log], "hold_out": [], "command": ""}
+    request["promises"] = {"friction.axes.coulomb[0]": (1e-9, 1e-9), "friction.axes.coulomb[1]": (None, None)}
+    told = _fitted({**request, "folder": str(tmp_path / "fit")}, lambda report: None)
+    assert told["warnings"][0]["severity"] == "warning"
+    assert "coulomb friction forward is known within" in told["warnings"][0]["text"].lower()
+    assert "times as wide as planned" in (tmp_path / "fit" / "warnings.csv").read_text("utf-8")

@@ -41,12 +41,14 @@ def robot(folder, *, radius=RADIUS, inertia=INERTIA):
     return omnidyn.load_robot(path)
 
 
-def log(seed, *, late_rows=0, push=(0.0, 0.0, 0.0), levels=20, held=40, still=25, coulomb=COULOMB):
-    """A Run of wheel speeds under random levels of voltage, from rest. push [N, N, N m]: a constant force."""
+def log(seed, *, late_rows=0, push=(0.0, 0.0, 0.0), dead_band=0.0, levels=20, held=40, still=25, coulomb=COULOMB):
+    """A Run of wheel speeds under random levels of voltage, from rest. push [N, N, N m]: a constant force.
+    dead_band [V]: of the driver, which takes so much off each voltage."""
     rng = np.random.default_rng(seed)
     volts = np.concatenate([np.zeros((still, 3)), np.repeat(rng.uniform(-6.0, 6.0, (levels, 3)), held, axis=0)])
     acting = np.concatenate([np.zeros((late_rows, 3)), volts])[: len(volts)]
-    twist = moved(acting, np.asarray(push), coulomb)
+    reaching = np.sign(acting) * np.maximum(np.abs(acting) - dead_band, 0.0)
+    twist = moved(reaching, np.asarray(push), coulomb)
     speeds = twist @ WRENCH / RADIUS + NOISE * rng.standard_normal(twist.shape)
     return omnidyn.Run(t=np.arange(len(volts)) * ROW, voltage=volts, wheel_speed=speeds)
 

@@ -119,6 +119,8 @@ def drive(
             "omnidyn: nothing written; -o LOG records it" if driven.run is not None else "omnidyn: nothing written"
         )
         say(f"omnidyn: wrote {out}" if out else nothing)
+    if driven.error is not None:
+        raise driven.error
     if not driven.is_complete:
         end_failed(driven.verdict)
 

@@ -45,18 +45,19 @@ def with_plan(document: Document, planned: Beside) -> Document:
     ]
     table = Table(("group", "key", "95 % planned +- %", "worst %", "got %"), rows, "<<>", name="planned")
     data = {group: {name: one._asdict() for name, one in numbers.items()} for group, numbers in planned.items()}
-    warnings = Points(_wider(planned), mark="", name="wider than planned")
-    parts = apart(document.parts, [table], [warnings] if warnings.words else [])
-    return replace(document, parts=parts, data={**document.data, "planned": data})
+    wider = _wider(planned)
+    points = [Points(wider, mark="", name="wider than planned")] if wider else []
+    data = {**document.data, "planned": data, "planned_warnings": [statement.to_dict() for statement in wider]}
+    return replace(
+        document, parts=apart(document.parts, [table], points), data=data, warnings=[*wider, *document.warnings]
+    )
 
 
 def _wider(planned: Beside) -> list[Statement]:
-    """What is known much less well than planned, by group."""
-    from omnidyn.identification.planning.got import wider_than_planned
-    from omnidyn.identification.verdict import of_group
+    """What is known much less well than planned."""
+    from omnidyn.identification.planning.got import wider_of_groups
 
-    warnings = [(group, statement) for group, got in planned.items() for statement in wider_than_planned(got)]
-    return [statement if len(planned) == 1 else of_group(group, statement) for group, statement in warnings]
+    return wider_of_groups(planned)
 
 
 def _promised_cell(of: Got | None) -> str:

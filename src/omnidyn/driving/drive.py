@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable
 from contextlib import suppress
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
@@ -16,14 +16,15 @@ from omnidyn.driving.program import DriveProgram
 from omnidyn.driving.record import DriveRecord
 from omnidyn.driving.recording import DriveRecording
 from omnidyn.driving.tabled import TabledConnection
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, Terminated, printable, shortened, told_by
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run
-from omnidyn.statement import WARNING, Statement
+from omnidyn.statement import ERROR, WARNING, Statement
 
 ANSWERS_WITHIN = 3.0  # [s] for the first answer of a robot
 GREETING = 0.3  # [s] in which the line is tried before the first row
 REST = 0.5  # [s] that are recorded after the last row
+MESSAGE = 200  # characters of an error that are told
 
 
 def drive(
@@ -39,8 +40,10 @@ def drive(
     """Drive a robot through a program, and record it.
 
     It stops where the robot is silent, late, begins anew or has a clock that jumps; at the border of the room; where a
-    wheel does not turn as predicted or slips; where the supply is low; and where `held` says no. Ctrl-C stops it too.
-    No motor gets anything later than `limits.dead_man` after that: each command ends by itself, on the robot's side.
+    wheel does not turn as predicted or slips; where the supply is low; and where `held` says no. Ctrl-C stops it too,
+    and so does an error of `held`, `progress`, `follow` or the connection: what was driven so far is in the record,
+    which names the error and has it as `error`. No motor gets anything later than `limits.dead_man` after that: each
+    command ends by itself, on the robot's side.
 
     Args:
         program: What is to be driven; `read_program` reads what `omnidyn plan` wrote.
@@ -52,7 +55,7 @@ def drive(
         follow: Hears where it is with each row, and at the end; it must return at once.
 
     Raises InputError for rows that are longer than half the dead-man time, for which a command acts, and for a
-    `TabledConnection` whose table is not for this program.
+    `TabledConnection` whose table is not for this program; and any error that comes before something was driven.
 
     >>> import omnidyn
     >>> robot = omnidyn.load_robot("axebot")
@@ -81,9 +84,26 @@ def drive(
         )
     if isinstance(connection, TabledConnection):
         connection.check(program)
-    driver = _Driver(program, connection, limits, clock or _clock_of(connection), held or (lambda: True), progress)
-    driver.follow = follow or (lambda moment: None)
+    held, progress = _named("held", held or (lambda: True)), _named("progress", progress)
+    driver = _Driver(program, connection, limits, clock or _clock_of(connection), held, progress)
+    driver.follow = _named("follow", follow or (lambda moment: None))
     return driver.run()
+
+
+class _CallError(Exception):
+    """A function of the caller failed: its name, and its error as the cause."""
+
+
+def _named(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function; its errors carry its name."""
+
+    def named(*args: Any) -> Any:
+        try:
+            return function(*args)
+        except Exception as error:
+            raise _CallError(name) from error
+
+    return named
 
 
 def _clock_of(connection: object) -> DriveClock:
@@ -116,29 +136,49 @@ class _Driver:
     ) -> None:
         self.program, self.connection, self.limits = program, connection, limits
         self.clock, self.held, self.progress = clock, held, progress
-        self.recording, self.guard = DriveRecording(), DriveGuard(program, limits, 0.0)
+        self.recording, self.guard = DriveRecording(program.robot.wheels.count), DriveGuard(program, limits, 0.0)
         self.session, self.number = secrets.randbelow(2**31 - 1) + 1, 0
         self.rows, self.start, self.driven_at = 0, 0.0, float("-inf")
         self.off = (0.0,) * program.robot.wheels.count
+        self.error: BaseException | None = None
         self.follow: Callable[[DriveMoment], None] = lambda moment: None
 
     def run(self) -> DriveRecord:
-        """All of it; whatever ends it, the robot is stopped."""
-        stopped = None
+        """All of it; whatever ends it, the robot is stopped, and what was recorded is kept."""
         try:
-            self.connection.open()
-            stopped = self._greet() or self._rows()
-            if stopped is None:
-                self._rest()
-        except KeyboardInterrupt:
-            stopped = Statement("drive_by_hand", WARNING)
-        except OSError as error:
-            stopped = Statement("drive_line_broke", WARNING, numbers={"error": str(error.strerror or error)})
+            stopped = self._kept(self._drive)
         finally:
-            self._stop()
-        self._tell()
+            failed = self._stop()
+        stopped = stopped or failed or self._kept(self._tell)
         run = self.recording.run(self.program.channel, self.program.source or self.program.robot.name)
-        return DriveRecord(self.program, run, self.rows, stopped, self.driven_at)
+        if run is None and self.error is not None:  # nothing to keep
+            raise self.error
+        return DriveRecord(self.program, run, self.rows, stopped, self.driven_at, self.error)
+
+    def _kept(self, step: Callable[[], Statement | None]) -> Statement | None:
+        """A step of the drive; what ends it by an error becomes the reason of the stop, so that the log is kept."""
+        try:
+            return step()
+        except OSError as error:
+            return Statement("drive_line_broke", WARNING, numbers={"error": str(error.strerror or error)})
+        except (Exception, KeyboardInterrupt, Terminated) as raised:
+            error = told_by(raised)
+            if isinstance(error, KeyboardInterrupt):
+                return Statement("drive_by_hand", WARNING)
+            name, error = (error.args[0], error.__cause__) if isinstance(error, _CallError) else ("", error)
+            self.error = self.error or error
+            if isinstance(error, Terminated):
+                return Statement("drive_terminated", WARNING)
+            message = f"{type(error).__name__}: {error}".removesuffix(": ")
+            code = "drive_call_failed" if name else "drive_failed"
+            return Statement(code, ERROR, name, {"error": shortened(printable(message), MESSAGE)})
+
+    def _drive(self) -> Statement | None:
+        self.connection.open()
+        stopped = self._greet() or self._rows()
+        if stopped is None:
+            self._rest()
+        return stopped
 
     def _greet(self) -> Statement | None:
         """Begin a session: the robot answers, and commands and answers take half of the dead-man time at the most: the
@@ -230,8 +270,15 @@ class _Driver:
         if any(inputs):
             self.driven_at = now
 
-    def _stop(self) -> None:
-        """Motors off, whatever the line makes of it: what was sent ends by itself."""
-        for end in (self.connection.stop, self.connection.close):
-            with suppress(OSError):
-                end()
+    def _stop(self) -> Statement | None:
+        """Motors off, whatever the line makes of it: what was sent ends by itself. The error of a connection that does
+        not even do that; a line that is broken already is none."""
+        failed = [
+            self._kept(lambda end=end: _without_line(end)) for end in (self.connection.stop, self.connection.close)
+        ]
+        return failed[0] or failed[1]
+
+
+def _without_line(end: Callable[[], None]) -> None:
+    with suppress(OSError):
+        end()

@@ -18,7 +18,8 @@ class DriveRecord(Displayable):
 
     program: that was driven. run: its log, as `identify` reads it; None where nothing was driven. rows: of the program
     that were sent. stopped: why it ended before the last row; None where it did not. stopped_at: when the last command
-    that moves anything was sent, on the clock of the drive [s].
+    that moves anything was sent, on the clock of the drive [s]. error: that ended it, to be raised where it should be;
+    None for none.
     """
 
     program: DriveProgram
@@ -26,6 +27,7 @@ class DriveRecord(Displayable):
     rows: int
     stopped: Statement | None
     stopped_at: float
+    error: BaseException | None = None
 
     @property
     def is_complete(self) -> bool:

@@ -9,17 +9,19 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.driving.connection import Command, Measured
+from omnidyn.errors import InputError
 from omnidyn.identification.live.rows import part
 from omnidyn.run import Run
-from omnidyn.sensors import CHANNELS, SCALAR
+from omnidyn.sensors import AXIS, CHANNELS, SCALAR, WHEEL
 
 TICK = 1e-6  # [s]: times that are nearer are one row
 
 
 class DriveRecording:
-    """Inputs and measurements of a drive, as they come."""
+    """Inputs and measurements of a drive, as they come. wheels: how many there are."""
 
-    def __init__(self) -> None:
+    def __init__(self, wheels: int) -> None:
+        self._widths = {name: {WHEEL: wheels, AXIS: 3, SCALAR: 1}[kind] for name, kind in CHANNELS.items()}
         self._sent: list[tuple[float, tuple[float, ...]]] = []
         self._measured: list[Measured] = []
         # Of the clock of the drive and that of the robot: of the measurement that came fastest
@@ -31,7 +33,18 @@ class DriveRecording:
         self._sent.append((now, command.inputs))
 
     def measured(self, now: float, measured: Measured) -> None:
-        """A measurement that came; those before the first command are kept, and left out of the log."""
+        """A measurement that came; those before the first command are kept, and left out of the log.
+
+        Raises InputError for one that no log can hold.
+        """
+        if not np.isfinite(measured.t):
+            raise InputError("not a time", got=measured.t, expected="seconds of its own clock", where="a measurement")
+        for name, value in measured.channels.items():
+            if name not in self._widths:
+                raise InputError("no such channel", got=name, expected=", ".join(CHANNELS), where="a measurement")
+            if np.shape(value) != (self._widths[name],):
+                shape, expected = np.shape(value), f"({self._widths[name]},)"
+                raise InputError("a wrong shape", got=str(shape), expected=expected, where=f"a measurement: {name}")
         self._difference = min(self._difference, now - measured.t)
         self._measured.append(measured)
 

@@ -1,8 +1,9 @@
 """A text file that is still being written: its rows as Runs, as they come.
 
 Only whole lines are taken. Which column is what is decided once, from the first rows; what stands above them belongs to
-all. Later a line that holds no row (half written, binary), and rows without numbers, are left out and counted. A clock
-that begins anew begins a Run of its own.
+all. Later a line that holds no row (half written, binary), and rows without numbers, are left out and counted. Rows
+that were written a little late are sorted; those that belong before rows that were given out already are left out and
+counted. A clock that begins anew begins a Run of its own.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +24,7 @@ from omnidyn.logs.clock.block_angles import BlockAngle
 from omnidyn.logs.clock.clock import Clock
 from omnidyn.logs.clock.counters import COUNTERS
 from omnidyn.logs.columns.mapping import ColumnMap
+from omnidyn.logs.log import Log, goes_back_often
 from omnidyn.logs.read_log import LogOptions, log_from_table, map_columns
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.table.table import FileTable
@@ -34,6 +37,7 @@ BROKEN = "\0"  # in its place
 BINARY = re.compile(r"[\x00-\x08\x0e-\x1f]")  # what no line of text holds, such as zeros after a loss of power
 TURN = 2.0 * np.pi
 PAUSE = 0.1  # [s] between two looks at a file
+LATE = 10  # steps of time by which a row may be late; a clock that goes back further begins anew
 AT_ONCE, TAIL = 1 << 20, 256  # bytes that are read; that are kept, to know a file again
 
 
@@ -83,6 +87,7 @@ class GrowingTable:
         self.bad_rows = 0
         self._rest, self._lines, self._head = "", list[str](), list[str]()
         self._clock, self._heading, self._wheels = Clock(), np.nan, list[BlockAngle]()
+        self._newest, self._step = -np.inf, np.nan  # [s]: time of the last row that was given out; between rows
 
     @property
     def resets(self) -> int:
@@ -111,7 +116,7 @@ class GrowingTable:
     def begin_anew(self) -> None:
         """The file was written anew: its clock, and perhaps its columns."""
         self.columns, self._head, self._rest, self._lines, self._clock = None, [], "", [], Clock()
-        self._wheels = []
+        self._wheels, self._newest = [], -np.inf
 
     def _read(self) -> list[Run]:
         lines = self._without_head(self._lines)
@@ -130,7 +135,7 @@ class GrowingTable:
                 lines = self._without_head(lines[first:])
             self.columns = self.columns or map_columns(table, self.robot, self.options)
             log = log_from_table(table, self.columns, self.robot, self.options, self._clock)
-            runs = [part.to_run() for part in log.recordings() if len(part)]
+            runs = self._runs(log, is_first)
         except InputError:
             if is_first:
                 raise
@@ -138,6 +143,31 @@ class GrowingTable:
             return []
         self.bad_rows += max(len(lines) - len(table), 0)
         return [self._continued(run) for run in runs]
+
+    def _runs(self, log: Log, is_first: bool) -> list[Run]:
+        """The rows in the order of their times, one Run for each start of the clock. Raises InputError for first rows
+        whose time goes back again and again: it is not the order that is wrong."""
+        timed = np.isfinite(log.t)
+        log = log.rows(timed)
+        if is_first and goes_back_often(max(int((np.diff(log.t) < 0.0).sum()) - 1, 0), len(log)):
+            log.to_run()
+        steps = np.diff(log.t)
+        self._step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else self._step
+        late = LATE * self._step if np.isfinite(self._step) else 0.0
+        newest, starts, too_late = self._newest, [0], np.zeros(len(log), bool)
+        for k, t in enumerate(log.t.tolist()):
+            if t < newest - late:
+                starts += [k] if k else []
+                self._newest = newest = t
+            too_late[k] = t < self._newest
+            newest = max(newest, t)
+        self._newest = newest
+        pieces = [np.arange(first, stop) for first, stop in pairwise([*starts, len(log)])]
+        sorted_rows = [piece[np.argsort(log.t[piece], kind="stable")] for piece in pieces]
+        parts = [log.rows(rows[~too_late[rows]]) for rows in sorted_rows]
+        runs = [part.to_run() for ordered in parts for part in ordered.recordings() if len(part)]
+        self.bad_rows += int(too_late.sum() + (~timed).sum())
+        return runs
 
     def _without_head(self, lines: list[str]) -> list[str]:
         """The lines without those of the head, which a logger that begins anew writes once more."""

@@ -162,8 +162,8 @@ def wheel_table(logs: Run | Sequence[Run], robot: Robot) -> WheelTable:
     """The table of wheels whose asked and measured speeds were logged, by steady stretches: a line for each direction.
 
     Wheels are measured by their speeds or angles, else by the twist that they make. Raises InputError where no speeds
-    were asked for, InsufficientDataError where a wheel does not turn both ways with two speeds or more, each held for
-    half a second.
+    were asked for, or a wheel turns the other way than it is asked to; InsufficientDataError where one does not turn
+    both ways with two speeds or more, each held for half a second.
 
     >>> import omnidyn
     >>> robot = omnidyn.load_robot("lekiwi")
@@ -198,6 +198,7 @@ def wheel_table(logs: Run | Sequence[Run], robot: Robot) -> WheelTable:
                 asked.append(pair[0])
                 turned.append(pair[1])
     rows = np.array(asked).reshape(-1, robot.wheels.count), np.array(turned).reshape(-1, robot.wheels.count)
+    _refuse_turned_round(*rows)
     return WheelTable(
         tuple(
             _line(wheel, direction, rows[0][:, wheel - 1], rows[1][:, wheel - 1])
@@ -205,6 +206,23 @@ def wheel_table(logs: Run | Sequence[Run], robot: Robot) -> WheelTable:
             for direction in (1, -1)
         )
     )
+
+
+def _refuse_turned_round(asked: FloatArray, turned: FloatArray) -> None:
+    """Raises InputError for wheels that turn the other way than they are asked to: a table hides no wrong sign."""
+    squares = np.maximum((asked**2).sum(axis=0), np.finfo(float).tiny)
+    gains = (asked * turned).sum(axis=0) / squares
+    wrong = [f"wheel {wheel} (gain {gain:.2f})" for wheel, gain in enumerate(gains.tolist(), 1) if gain < -GAINS[0]]
+    if wrong:
+        raise InputError(
+            "a wheel turns the other way than it is asked to",
+            got=", ".join(wrong),
+            expected="gains above 0",
+            remedy="look at the wheel: where it does turn the other way, swap the wires of its motor, the sign in its "
+            "driver, or its azimuth in the robot file by 180 degrees; where only its encoder counts the other way, "
+            "read its column with a minus (`column` w2=-NAME); then write the table again",
+            where="logs",
+        )
 
 
 def _speeds(mean: Any, names: tuple[str, str], robot: Robot) -> FloatArray | None:

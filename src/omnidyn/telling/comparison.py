@@ -44,22 +44,34 @@ def _signal_followed(statement: Statement) -> str:
     percent = f"{max(1.0, round(100.0 * numbers['share'])):.0f} %"
     how = {
         "well": f"within {percent}",
-        "noise": f"as far as noise lets it ({percent})",
+        "noise": f"as far as the noise allows ({percent})",
         "roughly": f"roughly ({percent})",
         "hardly": f"hardly ({percent})",
         "not": f"not at all (rms error {numbers['error']:.2g} {numbers['unit']})",
     }
+    if _is_mere_noise(statement):
+        return f"there is mere noise in {statement.subject} (rms error {numbers['error']:.2g} {numbers['unit']})"
     return f"{statement.subject} {how[numbers['level']]}"
 
 
+def _is_mere_noise(statement: Statement) -> bool:
+    """Whether errors that are white are larger than what is to be followed, as of a position that hardly moves."""
+    return statement.numbers["level"] == "noise" and statement.numbers["share"] >= 1.0
+
+
 def _follows(statement: Statement) -> str:
-    """A model follows some of what was measured; what it hardly follows, or not at all, is named too."""
-    signals = statement.numbers["signals"]
+    """A model follows some of what was measured; what it hardly follows, or not at all, is named too, and where there
+    is nothing but noise to follow."""
+    signals, noises = (
+        [signal for signal in statement.numbers["signals"] if _is_mere_noise(signal) is mere] for mere in (False, True)
+    )
     good, bad = (
         [str(signal) for signal in signals if (signal.numbers["level"] in ("hardly", "not")) is poor]
         for poor in (False, True)
     )
-    return f"{statement.subject} follows {all_of(good)}{f', but {all_of(bad)}' if bad else ''}"
+    words = f"{statement.subject} follows {all_of(good or bad)}{f', but {all_of(bad)}' if good and bad else ''}"
+    parts = [words] if signals else [f"{statement.subject} has nothing to follow"]
+    return "; ".join([*parts, *map(str, noises)])
 
 
 def _does_not_follow(statement: Statement) -> str:

@@ -58,6 +58,15 @@ SENTENCES = {
     ),
     "drive_released": Sentence("the key was released", "drive the rest with `resume`"),
     "drive_by_hand": Sentence("it was stopped by hand", "drive the rest with `resume`"),
+    "drive_terminated": Sentence("this program was told to end", "drive the rest with `resume`"),
+    "drive_call_failed": Sentence(
+        "`{subject}` failed: got {error}; expected a function that returns",
+        "mend it, then drive the rest with `resume`; `error` of the record has where it failed",
+    ),
+    "drive_failed": Sentence(
+        "what came from the robot could not be taken: {error}",
+        "mend the connection, or report it if it is not yours; then drive the rest with `resume`",
+    ),
     "drive_slow_loop": Sentence(
         "this computer was held up for {seconds:m.0f} ms", "end other programs, then drive the rest with `resume`"
     ),

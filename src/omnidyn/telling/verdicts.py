@@ -75,9 +75,15 @@ def _planned_rig(statement: Statement) -> str:
 
 
 def _planned_next(statement: Statement) -> str:
-    """ "58 s more of driving bring the widest interval of axebot from 27 % (viscous friction turning) to 6 % (..)" """
+    """ "58 s more of driving bring the widest interval of axebot from 27 % (viscous friction turning) to 6 % (..)", or
+    leave it as wide as it is."""
     numbers = statement.numbers
     before, after = (_within(numbers[share]) for share in ("known", "share"))
+    if before == after or numbers["share"] >= numbers["known"]:
+        return (
+            f"{numbers['seconds']:.3g} s more of driving do not narrow the widest interval of {statement.subject}, "
+            f"{before} ({in_words(numbers['before'])}): plan for more time, a larger room or another sensor"
+        )
     return (
         f"{numbers['seconds']:.3g} s more of driving bring the widest interval of {statement.subject} from {before} "
         f"({in_words(numbers['before'])}) to {after} ({in_words(numbers['widest'])})"

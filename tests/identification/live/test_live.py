@@ -299,5 +299,23 @@ def test_what_cannot_be_used_is_refused():
         omnidyn.Live(ROBOT, reference=omnidyn.load_robot("mecanum"))
     with pytest.raises(omnidyn.OmnidynError, match="unknown key; got nonsense"):
         omnidyn.Live(ROBOT, omnidyn.OutputError(free=("nonsense",)))
-    with pytest.raises(omnidyn.OmnidynError, match=r"speed loop.*expected drive kind voltage or duty"):
-        omnidyn.Live(omnidyn.load_robot("robotino"))
+    words = r"speed loop whose voltages are not logged.*got wheel_speed, wheel_speed_command; .*`identify`"
+    still = np.zeros((2, 3))
+    with pytest.raises(omnidyn.OmnidynError, match=words):
+        omnidyn.Live(omnidyn.load_robot("robotino")).add(
+            omnidyn.Run(t=[0.0, 0.1], wheel_speed=still, wheel_speed_command=still)
+        )
+
+
+def test_a_robot_with_a_speed_loop_is_followed_where_its_voltages_are_logged():
+    """As `identify` fits it: what reached the motors drives the model, and the set speeds do not."""
+    rng = np.random.default_rng(0)
+    run = omnidyn.simulate(ROBOT, np.repeat(rng.uniform(-5.0, 5.0, (25, 3)), 40, axis=0), 0.01)
+    speeds = run.wheel_speed + 0.05 * rng.standard_normal(run.wheel_speed.shape)
+    log = omnidyn.Run(t=run.t, voltage=run.voltage, wheel_speed=speeds, wheel_speed_command=run.wheel_speed)
+    live = omnidyn.Live(ROBOT.replace(drive=ROBOT.drive.replace(kind="speed", kp=0.5, ki=2.0, rate=100.0)))
+    numbers = live.add(log).numbers
+    for axis, truth in enumerate(ROBOT.friction.axes.coulomb):
+        number = numbers[f"friction.axes.coulomb[{axis}]"]
+        assert abs(number.value - truth) < number.high - number.low
+        assert number.high - number.low < 0.1 * truth

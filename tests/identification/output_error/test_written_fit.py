@@ -76,6 +76,24 @@ def test_a_constant_push_is_fitted_where_it_is_there(tmp_path):
     assert result.held_out.plain > 3.0 * result.held_out.written
 
 
+@pytest.mark.parametrize("dead_band", [0.2, 0.8])
+def test_a_dead_band_that_the_file_does_not_hold_is_fitted_without_a_diagnosis(tmp_path, dead_band):
+    """One motor differs by a ten-thousandth: the axes couple, and no engine is exact."""
+    given = plain_robot.robot(tmp_path)
+    given = given.replace(motor=given.motor.replace(resistance=(plain_robot.OHM,) * 2 + (1.0001 * plain_robot.OHM,)))
+    result = omnidyn.identify(plain_robot.log(5, dead_band=dead_band), given, quick=True)
+    found = result.nuisances["dead_band"]
+    assert abs(found.value - dead_band) < 4.0 * found.std
+    assert result.robot.drive.dead_band == found.value
+    truths = [*plain_robot.VISCOUS, *plain_robot.COULOMB]
+    for (key, value), truth in zip(result.value.items(), truths, strict=True):
+        assert abs(value - truth) < 4.0 * result.std[key], key
+    (warning,) = (warning for warning in result.warnings if warning.code == "driver_dead_band")
+    assert f"the first {found.value:.3g} V" in str(warning)
+    straight = omnidyn.identify(plain_robot.log(5), given, quick=True)
+    assert "dead_band" not in straight.nuisances
+
+
 def test_a_right_model_has_no_push_and_is_as_good_as_the_plain_fit(tmp_path):
     log = plain_robot.log(6)
     result = omnidyn.identify(log, plain_robot.robot(tmp_path), quick=True)

@@ -50,7 +50,8 @@ class Live:
             only these numbers count.
         reference: The robot as it was fitted before: what differs from it is said, as floor, payload or wear.
 
-    Raises InputError for what cannot be used, UnsupportedError for a speed loop, whose voltages are not logged.
+    Raises InputError for what cannot be used, UnsupportedError for rows of set speeds without voltages or duties: those
+    of a speed loop in the firmware are fitted as a whole log only.
 
     >>> import numpy as np, omnidyn
     >>> robot, rng = omnidyn.load_robot("axebot"), np.random.default_rng(0)
@@ -73,14 +74,6 @@ class Live:
         reference: Robot | None = None,
     ) -> None:
         check_order("Live(robot, method)", (robot, (Robot,)), (method, (OutputError, type(None))))
-        if robot.drive.kind == SPEED:
-            raise UnsupportedError(
-                "a speed loop makes its voltages itself, and cannot be followed live",
-                got=f"drive kind {SPEED}",
-                expected="drive kind voltage or duty",
-                remedy="log what reaches the motors, or fit the whole log with identify",
-                where="robot",
-            )
         if reference is not None and reference.wheels.count != robot.wheels.count:
             raise InputError(
                 "the fit before is of another robot",
@@ -134,6 +127,15 @@ class Live:
                 expected=f"{self.robot.wheels.count}, as {self.robot.name} has",
                 remedy="give the robot that the log is of",
                 where=run.source,
+            )
+        if self.robot.drive.kind == SPEED and run.voltage is None and run.duty is None:
+            raise UnsupportedError(
+                "a speed loop whose voltages are not logged cannot be followed live",
+                got=", ".join(run.channels),
+                expected="the voltage or duty of each motor beside its set speed",
+                remedy="let the firmware log what it gives the motors; or log the drive to its end, and fit all of it "
+                "with `identify`, which simulates the loop",
+                where=run.source or "log",
             )
         repeated = self._rows.repeated(run)
         if len(run) == repeated:

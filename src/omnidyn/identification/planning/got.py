@@ -66,6 +66,14 @@ def wider_than_planned(got: Mapping[str, Got]) -> list[Statement]:
     return [Statement("wider_than_planned", WARNING, name, {"times": times[name], "got": got[name].got})]
 
 
+def wider_of_groups(planned: Mapping[str, Mapping[str, Got]]) -> list[Statement]:
+    """What is known much less well than planned, by group; the group is named where there are several."""
+    from omnidyn.identification.verdict import of_group  # imported lazily: slow to load
+
+    warnings = [(group, statement) for group, got in planned.items() for statement in wider_than_planned(got)]
+    return [statement if len(planned) == 1 else of_group(group, statement) for group, statement in warnings]
+
+
 def _share(value: Any) -> float:
     if value is None:
         return math.inf

@@ -20,7 +20,7 @@ from omnidyn.identification.identification import Identification
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.prepare import free_by_default, guesses
-from omnidyn.identification.planning.got import Got, beside
+from omnidyn.identification.planning.got import Got, beside, wider_of_groups
 from omnidyn.model.keys import EMF, ROTOR, TORQUE, Key, find_key, in_words, unit
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
@@ -78,8 +78,10 @@ def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
         omnidyn.save_robot(estimates[group].robot, folder / file)
     _ = result.after  # what follows a fit is made here, where its progress is heard
     listen(Report("drawing"))
-    table = _with_before(_numbers(estimates, request.get("promises") or {}), robot)
-    said = dict.fromkeys(warning for estimate in estimates.values() for warning in estimate.warnings)
+    promised = _beside_plan(estimates, request.get("promises") or {})
+    table = _with_before(_numbers(estimates, promised), robot)
+    of_fits = [warning for estimate in estimates.values() for warning in estimate.warnings]
+    said = dict.fromkeys([*wider_of_groups(promised), *of_fits])
     warnings = [{"severity": warning.severity, "text": str(warning)} for warning in said]
     (folder / "numbers.csv").write_text(_csv(table), "utf-8")
     (folder / "warnings.csv").write_text(
@@ -115,13 +117,20 @@ def gravest(statements: Sequence[Statement]) -> str:
     return min((statement.severity for statement in statements), key=SEVERITIES.index)
 
 
-def _numbers(estimates: Mapping[str, Estimate], promises: Mapping[str, Sequence[float | None]]) -> Table:
+def _beside_plan(
+    estimates: Mapping[str, Estimate], promises: Mapping[str, Sequence[float | None]]
+) -> dict[str, Mapping[str, Got]]:
+    """Group -> what a plan promised of its numbers (half an interval, in the middle and at the worst) and what the fit
+    has; nothing without a plan."""
+    shares = {key: (_share(half), _share(worst)) for key, (half, worst) in promises.items()}
+    return {group: beside(shares, estimate) for group, estimate in estimates.items()} if promises else {}
+
+
+def _numbers(estimates: Mapping[str, Estimate], promised: Mapping[str, Mapping[str, Got]]) -> Table:
     """Every number with its interval, and behind it its group where there are several; beside it what a plan promised,
-    where there was one: half an interval, in the middle and at the worst."""
+    where there was one."""
     tables = {group: _numbers_of(estimate) for group, estimate in estimates.items()}
-    if promises:
-        promised = {key: (_share(half), _share(worst)) for key, (half, worst) in promises.items()}
-        tables = {group: _with_plan(table, beside(promised, estimates[group])) for group, table in tables.items()}
+    tables = {group: _with_plan(table, promised[group]) for group, table in tables.items()} if promised else tables
     rows = [
         (f"{row[0]} ({group})" if group else row[0], *row[1:]) for group, table in tables.items() for row in table.rows
     ]
