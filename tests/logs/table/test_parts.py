@@ -223,6 +223,8 @@ def test_the_lines_of_a_head():
     other = layout("Time,Voltage\nt,u\ns,V\n0,1\n1,2")
     assert (other.names, other.first) == (("t", "u"), 4)
     assert other.notes == ("line 2 gives the names, line 3 the units, line 1 the titles",)
+    twice = layout("Time,Voltage\ns,V\nt,t\n0,1\n1,2")  # two alike are no names: a row of words
+    assert (twice.names, twice.first, dict(twice.titles)) == (("Time", "Voltage"), 3, {})
     two = layout("t,u\ns,V\n0,1")
     assert (two.names, two.first, two.notes) == (("t", "u"), 3, ())
     words = layout("t,state\n0,off\n1,on\n2,off\n3,on")
@@ -312,6 +314,7 @@ def test_names_are_checked_one_by_one():
         (["Model", "0,1", "1,2", "2,3"], 0),  # no names
         (["Model", "5,6", "t,u", "0,1", "1,2", "2,3"], 0),  # a line above has as many cells
         (["Model", "t", "0", "1", "2"], 0),  # one column
+        (["Model,X,", "t,u,w", "0,1,2", "1,2,3", "2,3,4"], 0),  # a blank cell is one of as many, too
         (["Model", "t,u", "0,1", "1,2,3", "2,3", "3,4", "4,5"], 0),
     ],
 )
@@ -342,6 +345,8 @@ def test_a_quoted_cell_may_hold_the_separator():
     assert parse("t,state", ['0,"a, b"', "1,c"])[0] == {"t": [0.0, 1.0], "state": ["a, b", "c"]}
     for cell in ("b,c", "b,c,d", "b,", ",b"):
         assert parse("t,state", [f'"0","{cell}"', '"1","c"'])[0] == {"t": [0.0, 1.0], "state": [cell, "c"]}
+    with pytest.raises(InputError, match=r"row 2 has another number of cells than the header; got 2: .*; expected 4"):
+        parse("t,a,b,c", ["0,1,2,3", '"0","1,2,3"'])
     assert parse("t,state", ['0,"a"', '1,"c"'])[0] == {"t": [0.0, 1.0], "state": ["a", "c"]}
 
 
