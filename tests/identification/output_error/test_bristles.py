@@ -124,7 +124,9 @@ def log_of(robot, seed, noise=0.002, voltage=None):
     ("true", "guess", "keys"),
     [
         (dahl(), dahl(1.2, 2.0, 1e3), OF_DAHL),
-        (lugre(), lugre(1.2, 2.0, 2.4, 0.03, 1e3, None), OF_LUGRE),
+        pytest.param(  # by the same engine as of dahl; its derivatives are tested above
+            lugre(), lugre(1.2, 2.0, 2.4, 0.03, 1e3, None), OF_LUGRE, marks=pytest.mark.long
+        ),
     ],
     ids=["dahl", "lugre"],
 )
