@@ -51,7 +51,13 @@ def test_a_push_and_a_wrong_model_leave_no_lasting_error(name, ki):
     assert np.abs(last[:, 2]).max() < 5e-4
 
 
-@pytest.mark.parametrize("loop", [(5.0, 0.0), (5.0, 5.0), (5.0, 25.0), (5.0, 250.0), (1.0, 25.0), (0.0, 50.0)], ids=str)
+LOOPS = [(5.0, 0.0), (5.0, 25.0), (0.0, 50.0)]  # without a sum, with both, the sum alone
+MORE_LOOPS = [(5.0, 5.0), (5.0, 250.0), (1.0, 25.0)]  # between these
+
+
+@pytest.mark.parametrize(
+    "loop", [*LOOPS, *(pytest.param(loop, marks=pytest.mark.long) for loop in MORE_LOOPS)], ids=str
+)
 @pytest.mark.parametrize("sensors", ["encoder", "camera"])
 def test_it_beats_a_kinematic_pi_on_a_plant_of_others(loop, sensors):
     plant, along = Plant(NUMBERS["lekiwi"] | {"loop": (*loop, 1000.0)}), paths(3.0)["clover"]

@@ -142,7 +142,7 @@ def test_numbers_that_do_not_predict_are_not_enough(exact):
 def test_a_model_that_leaves_something_out_is_said_and_never_enough():
     """Friction along the direction of travel, as one disc, by Euler steps of 0.5 ms; the model has it along each axis.
     All intervals are narrow, stretches are predicted within autocorrelated errors, and Coulomb friction is 70 % off."""
-    volts = voltages(np.random.default_rng(100), 45.0)
+    volts = voltages(np.random.default_rng(100), 25.0)
     mass, viscous, level = np.array([1.5, 1.5, 0.025]), np.array(list(TRUTH.values())[:3]), np.array([2.2, 1.5, 0.099])
     azimuth = np.deg2rad([180.0, -60.0, 60.0])
     wrench = np.stack([-np.sin(azimuth), np.cos(azimuth), np.full(3, 0.1)])

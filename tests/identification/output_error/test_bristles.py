@@ -124,7 +124,9 @@ def log_of(robot, seed, noise=0.002, voltage=None):
     ("true", "guess", "keys"),
     [
         (dahl(), dahl(1.2, 2.0, 1e3), OF_DAHL),
-        (lugre(), lugre(1.2, 2.0, 2.4, 0.03, 1e3, None), OF_LUGRE),
+        pytest.param(  # by the same engine as of dahl; its derivatives are tested above
+            lugre(), lugre(1.2, 2.0, 2.4, 0.03, 1e3, None), OF_LUGRE, marks=pytest.mark.long
+        ),
     ],
     ids=["dahl", "lugre"],
 )
@@ -137,6 +139,7 @@ def test_a_soft_bristle_is_found(true, guess, keys):
         assert fit.std[key] <= 0.15 * value
 
 
+@pytest.mark.long  # trust/test_uncertainty.py has what a log does not show, of other numbers
 def test_a_stiffness_that_the_log_does_not_show_is_not_determined():
     """A bristle that bends by 22 micrometres, once, under noise of 2 cm/s."""
     true, guess = dahl(stiffness=1e5), dahl(1.2, 2.0, 3e4)
