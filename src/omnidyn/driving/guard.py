@@ -164,10 +164,10 @@ class DriveGuard:
         wheels = np.flatnonzero(body.time - self._slips_since >= SLIPS_FOR)
         return int(wheels[0]) + 1 if wheels.size else None
 
-    def _surely_turned(self, rows: np.ndarray, way: FloatArray) -> FloatArray:
-        """How far each wheel turns its way at least in the window before any of these rows, however it is hindered by
+    def _surely_turned(self, rows: np.ndarray, signs: FloatArray) -> FloatArray:
+        """How far each wheel turns at least, with these signs, in the window before any of these rows, however hindered by
         friction [rad]. Shape (wheels,)."""
-        return np.min([(way * self._way(rows, angle)).min(axis=0) for angle in self._hindered], axis=0)
+        return np.min([(signs * self._way(rows, angle)).min(axis=0) for angle in self._hindered], axis=0)
 
     def _way(self, rows: np.ndarray, angle: FloatArray | None = None) -> FloatArray:
         """How far each wheel turns in the window before these rows [rad], by an angle of each row, as predicted by
