@@ -165,8 +165,8 @@ class DriveGuard:
         return int(wheels[0]) + 1 if wheels.size else None
 
     def _surely_turned(self, rows: np.ndarray, signs: FloatArray) -> FloatArray:
-        """How far each wheel turns at least, with these signs, in the window before any of these rows, however hindered by
-        friction [rad]. Shape (wheels,)."""
+        """How far each wheel turns at least, with these signs, in the window before any of these rows, however friction
+        hinders it [rad]. Shape (wheels,)."""
         return np.min([(signs * self._way(rows, angle)).min(axis=0) for angle in self._hindered], axis=0)
 
     def _way(self, rows: np.ndarray, angle: FloatArray | None = None) -> FloatArray:
