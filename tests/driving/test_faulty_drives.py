@@ -149,3 +149,37 @@ def test_the_noise_of_a_camera_is_no_slip(seed):
     noise = {"wheel_angle": (2.0 * np.pi / 2048.0,) * 3, "pose": (0.006, 0.006, 0.005)}
     record = drive(DriveProgram(robot, DT, rows), SimulatedRobot(robot, noise, seed=seed))
     assert record.stopped is None, record.verdict
+
+
+def slow_ramps(top, seconds):
+    """Ramps along each axis, both ways, as a plan begins; then steps of nearly all volts."""
+    count = round(seconds / DT)
+    up = np.concatenate([np.linspace(0.0, top, count), np.linspace(top, 0.0, count)])
+    rows = [np.zeros((10, 3))]
+    for shape in (up, np.full(25, 5.5)):
+        for pattern in ([0.0, 1.0, -1.0], [-1.0, 0.5, 0.5], [1.0, 1.0, 1.0]):
+            leg = np.concatenate([np.outer(shape, pattern), np.zeros((20, 3))])
+            rows += [leg, -leg]
+    return DriveProgram(PROGRAM.robot, DT, np.concatenate(rows), (30.0, 30.0))
+
+
+@pytest.mark.parametrize("wheel", range(3))
+def test_a_stuck_wheel_is_seen_on_a_slow_ramp_before_the_fast_steps(wheel):
+    """1.6 s went by behind half a radian before, and 25 s where the first ramps are lower."""
+    program = slow_ramps(2.5, 3.0)
+    turned = DT * np.cumsum(np.abs(program.predicted.wheel_speed[:, wheel]))
+    robot = SimulatedRobot(
+        PROGRAM.robot, {"wheel_angle": np.full(3, 0.003)}, rate=1.0 / DT, faults=[Fault("stuck", 0.0, 0.0, wheel)]
+    )
+    record = drive(program, robot)
+    assert record.stopped is not None
+    assert (record.stopped.code, record.stopped.numbers["wheel"]) == ("drive_stuck", wheel + 1)
+    assert record.rows * DT - DT * np.argmax(turned > 0.5) < 1.2
+
+
+def test_healthy_robots_drive_slow_ramps_to_the_end():
+    for k, robot in enumerate(robots(6)):
+        for program in (slow_ramps(1.5, 2.0), slow_ramps(2.5, 3.0)):
+            simulated = SimulatedRobot(robot, {"wheel_speed": np.full(3, 0.1)}, rate=1.0 / DT, seed=k)
+            record = drive(program, simulated)
+            assert record.is_complete, record.verdict

@@ -17,6 +17,7 @@ MERGED = ("run", "log", "record", "self", "piece")  # what a `.t` of all clocks 
 # file -> (how many steps between rows, why all rows are meant)
 ALLOWED = {
     "logs/log.py": (8, "the order and the repeats of stamps, of all rows"),
+    "logs/growing.py": (1, "the order of rows as they come, of all rows"),
     "logs/path.py": (1, "an integral over all rows, each filled"),
     "logs/plateaus.py": (2, "rows that were chosen by their channel"),
     "findings/time_base.py": (3, "the order and the repeats of stamps, of all rows"),

@@ -18,9 +18,10 @@ from omnidyn.statement import WARNING, Statement
 
 WINDOW = 0.3  # [s] of travel that is compared
 FOLLOWS_WITHIN = 0.2  # [s] later than predicted, at the latest
-MOVING = 0.25  # of the longest travel of a wheel in a window of the program: less is not judged
+MOVING = 0.25  # of the longest travel of a wheel in a window of the program: what slips is judged against it
+SURELY_MOVING = 0.06  # of the same: a wheel that a robot hindered by friction would turn less is not judged
 ONE_WAY = 0.9  # of the predicted travel of a wheel, to and fro: else it turns round in the window, and is not judged
-FOLLOWS = 0.2  # of the predicted travel: a wheel that turns less does not follow
+FOLLOWS = 0.2  # of the travel of a hindered robot: a wheel that turns less does not follow
 SLIPS_FOR = 0.15  # [s]: a slip that ends sooner is noise of a sensor
 SLIPS = 0.5  # of the travel: by so much wheels and body may differ
 LEAST_SUPPLY = 0.75  # of the supply in the robot file
@@ -66,12 +67,13 @@ class DriveGuard:
         self._travel = {"encoders": _Travel(WINDOW + delay), "body": _Travel(WINDOW)}
         speed = np.asarray(program.predicted.wheel_speed)
         self._slips_since = np.full(program.robot.wheels.count, np.inf)  # time of each wheel [s]
-        self._predicted = np.zeros_like(speed)
-        np.cumsum(0.5 * program.dt * (speed[1:] + speed[:-1]), axis=0, out=self._predicted[1:])
+        self._predicted = _added(speed, program.dt)
+        self._hindered = [_added(np.asarray(run.wheel_speed), program.dt) for run in program.hindered]
         self._distance = np.zeros_like(speed)
         np.cumsum(0.5 * program.dt * np.abs(speed[1:] + speed[:-1]), axis=0, out=self._distance[1:])
         self._back = max(round(WINDOW / program.dt), 1)
-        self._judged = MOVING * np.abs(self._way(np.arange(len(speed)))).max(axis=0)
+        farthest = np.abs(self._way(np.arange(len(speed)))).max(axis=0)
+        self._judged, self._surely = MOVING * farthest, SURELY_MOVING * farthest
         supply = program.robot.drive.supply
         of_file = LEAST_SUPPLY * supply if supply else 0.0
         self._least_supply = of_file if limits.supply is None else limits.supply
@@ -141,8 +143,8 @@ class DriveGuard:
         one_way = np.abs(np.sign(wanted).sum(axis=0)) == len(rows)
         one_way &= (np.abs(wanted) >= ONE_WAY * distance).all(axis=0)
         least = np.abs(wanted).min(axis=0) * np.sign(wanted[-1])
-        along = turned * np.sign(least)
-        bad = np.flatnonzero(one_way & (np.abs(least) > self._judged) & (along < FOLLOWS * np.abs(least)))
+        along, surely = turned * np.sign(least), self._surely_turned(rows, np.sign(least))
+        bad = np.flatnonzero(one_way & (surely > self._surely) & (along < FOLLOWS * surely))
         if not bad.size:
             return None
         wheel = int(bad[np.argmin(along[bad])])
@@ -162,9 +164,23 @@ class DriveGuard:
         wheels = np.flatnonzero(body.time - self._slips_since >= SLIPS_FOR)
         return int(wheels[0]) + 1 if wheels.size else None
 
-    def _way(self, rows: np.ndarray) -> FloatArray:
-        """How far each wheel turns in the window before these rows, as predicted [rad]. Shape (rows, wheels)."""
-        return self._predicted[rows] - self._predicted[np.maximum(rows - self._back, 0)]
+    def _surely_turned(self, rows: np.ndarray, signs: FloatArray) -> FloatArray:
+        """How far each wheel turns at least, with these signs, in the window before any of these rows, however friction
+        hinders it [rad]. Shape (wheels,)."""
+        return np.min([(signs * self._way(rows, angle)).min(axis=0) for angle in self._hindered], axis=0)
+
+    def _way(self, rows: np.ndarray, angle: FloatArray | None = None) -> FloatArray:
+        """How far each wheel turns in the window before these rows [rad], by an angle of each row, as predicted by
+        default. Shape (rows, wheels)."""
+        angle = self._predicted if angle is None else angle
+        return angle[rows] - angle[np.maximum(rows - self._back, 0)]
+
+
+def _added(speed: FloatArray, dt: float) -> FloatArray:
+    """Angles [rad] of speeds [rad/s]. Shape (rows, wheels)."""
+    angle = np.zeros_like(speed)
+    np.cumsum(0.5 * dt * (speed[1:] + speed[:-1]), axis=0, out=angle[1:])
+    return angle
 
 
 class _Travel:

@@ -19,6 +19,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Table
 from omnidyn.errors import InputError
 from omnidyn.model.drive import DUTY, SPEED
+from omnidyn.model.keys import BREAKAWAY, COULOMB, Key, all_keys
 from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
@@ -34,6 +35,7 @@ STILL = (0.005, np.radians(1.0))  # [m], [rad]: less is no way
 BACK = 0.2  # of its farthest way: a leg that comes back by more says so
 ROUNDING = 1e-9  # of a duty, of a limit
 MOST_SPEED = 3.0  # of the speed without load: a set point beyond it is no speed of that wheel
+HINDERED = 1.7  # times the dry friction of a robot file: 30 % more of it, and 30 % less force of the motors
 LARGEST = 1000.0  # [m] of a side of a room
 TURN_ONLY = 0.1  # [m] a rad: less way beside a turn is not named
 
@@ -65,6 +67,13 @@ class Leg(NamedTuple):
         """Its end as text: x [m], y [m], heading [deg]; no -0."""
         x, y = np.round(self.pose[:2], 2) + 0.0
         return f"{x:.2f}", f"{y:.2f}", f"{np.round(np.degrees(self.pose[2])) + 0.0:.0f}"
+
+
+def _rougher(robot: Robot, keys: Sequence[Key]) -> Robot:
+    """The robot with HINDERED times as much of these levels of friction."""
+    for key in keys:
+        robot = key.set(robot, HINDERED * key.get(robot), checked=False)
+    return robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +166,16 @@ class DriveProgram(Displayable):
         if self.channel == "duty":
             given["supply"] = self.robot.drive.supply
         return simulate(self.robot, dt=self.dt, **given)
+
+    @cached_property
+    def hindered(self) -> tuple[Run, ...]:
+        """What it does where dry friction is HINDERED times that of the file, in all its numbers and in each alone."""
+        groups: dict[str, list[Key]] = {}
+        for key in map(Key.parse, all_keys(self.robot)):
+            if key.level in (COULOMB, BREAKAWAY) and key.get(self.robot):
+                groups.setdefault(str(key).replace(BREAKAWAY, COULOMB), []).append(key)
+        changes = [[key for keys in groups.values() for key in keys], *groups.values()]
+        return tuple(replace(self, robot=_rougher(self.robot, keys)).predicted for keys in changes)
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:

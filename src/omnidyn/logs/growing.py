@@ -149,9 +149,9 @@ class GrowingTable:
         whose time goes back again and again: it is not the order that is wrong."""
         timed = np.isfinite(log.t)
         log = log.rows(timed)
-        if is_first and goes_back_often(max(int((np.diff(log.t) < 0.0).sum()) - 1, 0), len(log)):
-            log.to_run()
         steps = np.diff(log.t)
+        if is_first and goes_back_often(max(int((steps < 0.0).sum()) - 1, 0), len(log)):
+            log.to_run()
         self._step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else self._step
         late = LATE * self._step if np.isfinite(self._step) else 0.0
         newest, starts, too_late = self._newest, [0], np.zeros(len(log), bool)
