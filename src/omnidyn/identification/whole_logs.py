@@ -15,6 +15,7 @@ from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.output_error.written_fit import gains_much
 from omnidyn.model.keys import in_words
 from omnidyn.run import Run
 from omnidyn.statement import WARNING, Statement
@@ -75,7 +76,10 @@ def with_size(fit: Fit, solution: Solution, runs: Sequence[Run], progress: FitPr
         wider_fit = Fit.of(
             runs, fit.given_robot, replace(fit.question, free=(*names, *size_keys), fixed=()), progress=inner_progress
         )
-        wider_solution = wider_fit.beside(solution, problem.nuisances, inner_progress)
+        wider_solution = wider_fit.beside(solution, problem.nuisances, inner_progress, limit=0)  # an exact one is done
+        if not group.engine.exact and not gains_much(wider_solution):  # the latency stands in for nothing
+            return fit, solution
+        wider_solution = wider_solution.gone_on(inner_progress)
     except OmnidynError:  # the logs do not tell these numbers
         return fit, solution
     margins = margins_of([solution, wider_solution])

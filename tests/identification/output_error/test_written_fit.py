@@ -121,6 +121,19 @@ def test_a_latency_that_a_log_cannot_tell_from_none_is_not_written(tmp_path, lat
     assert omnidyn.identify(late_log, given, quick=True).robot.drive.latency == pytest.approx(0.02, abs=0.002)
 
 
+def test_a_current_that_is_read_before_its_command_is_of_the_voltage_before(tmp_path):
+    """It is late by nothing that can be told from 0, and 0 is the other side of a jump: the right fit had failed."""
+    log = plain_robot.log(6)
+    before = np.vstack([log.voltage[:1], log.voltage[:-1]])
+    emf = plain_robot.CONSTANT * plain_robot.GEAR * log.wheel_speed
+    noise = 0.03 * np.random.default_rng(8).normal(size=emf.shape)
+    log = log.replace(current=(before - emf) / plain_robot.OHM + noise)
+    result = omnidyn.identify(log, plain_robot.robot(tmp_path), quick=True)
+    assert 0.0 < result.nuisances["latency.current"].value < 1e-4
+    rmse = omnidyn.compare(result.robot, log).rmse
+    assert all(rmse[name] < 0.05 for name in ("i1", "i2", "i3"))
+
+
 def test_no_row_after_a_start_from_rest_is_left_out(tmp_path):
     """Voltage from the first row on, 20 ms late: what was before is known, and the first rows tell the latency."""
     log, given = plain_robot.log(7, late_rows=1, still=0, levels=3, held=15), plain_robot.robot(tmp_path)

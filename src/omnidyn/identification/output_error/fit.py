@@ -8,7 +8,7 @@ correlation that the shared numbers bring about.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -20,7 +20,7 @@ from omnidyn.identification.methods import AUTO, OutputError, degrees
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import ALL_LOGS, begun, group_names
 from omnidyn.identification.output_error.conclusion import conclude, unexplained
-from omnidyn.identification.output_error.joint import join, joint_start, own_names
+from omnidyn.identification.output_error.joint import in_each_group, join, joint_start, own_names
 from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
 from omnidyn.identification.output_error.linear.rounded_inputs import beside_rounding
 from omnidyn.identification.output_error.linear.sensitivity import moved_by_the_file
@@ -58,12 +58,12 @@ from omnidyn.identification.output_error.written_fit import (
     beside_given,
     best_with_force,
     better_of,
-    better_with_dead_band,
-    gains_much,
+    is_white,
     screened,
     why_white,
+    with_dead_band,
 )
-from omnidyn.model.actuation import DEAD_BAND, GAIN
+from omnidyn.model.actuation import GAIN
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
 from omnidyn.progress import silent
@@ -180,7 +180,7 @@ class Fit:
         weighed_solution, warnings = weighed_fit.solution, [*warnings, *weighed_fit.warnings, *rounded]
         strata = {id(record): group.name for group in self.groups for record in group.records}
         profile, draws = (self.question.profile, self.question.bootstrap) if is_final else ((), 0)
-        names = _in_each_group(profile, weighed_solution.solver.problem)
+        names = in_each_group(profile, weighed_solution.solver.problem)
         resampled_fit = resampled(
             weighed_solution.solver, weighed_solution, weighed_fit.uncertainty, names, draws, strata, progress
         )
@@ -338,11 +338,12 @@ class Fit:
         if not self._chooses:
             return solution
         chosen_solution = better_of(solution, self._plain(solution, progress))
-        if _is_white(chosen_solution):
+        if is_white(chosen_solution):
             return chosen_solution
-        chosen_solution = self._with_dead_band(solution, chosen_solution, progress)
+        if not self.groups[0].engine.exact:  # that has a dead band from the start
+            chosen_solution = with_dead_band(solution, chosen_solution, self.beside, progress)
         adds_up = chosen_solution.solver.problem.travels.all()  # then no force is taken
-        if adds_up or _is_white(chosen_solution):
+        if adds_up or is_white(chosen_solution):
             return chosen_solution
         inner_progress = progress.aside("once more with a constant force")
         try:
@@ -353,21 +354,6 @@ class Fit:
         except UnsupportedError:  # an engine that knows no constant force
             return chosen_solution
         return best_with_force(chosen_solution, screened(chosen_solution, begun_fits, inner_progress))
-
-    def _with_dead_band(self, solution: Solution, chosen_solution: Solution, progress: FitProgress) -> Solution:
-        """The chosen fit, or one with a dead band of the driver beside the nuisances of `solution`, where that pays.
-
-        An exact engine has it from the start; of one that marches each number more takes its time, so first
-        a score test (C. R. Rao, 1948) says whether the likelihood asks for it: one simulation, no step.
-        """
-        names = solution.solver.problem.nuisances
-        if DEAD_BAND in names or self.groups[0].engine.exact:
-            return chosen_solution
-        inner_progress = progress.aside("once more with a dead band")
-        begun_fit = self.beside(solution, [*names, DEAD_BAND], inner_progress, limit=0)
-        if not gains_much(begun_fit):
-            return chosen_solution
-        return better_with_dead_band(chosen_solution, begun_fit.gone_on(inner_progress))
 
     def _plain(self, solution: Solution, progress: FitProgress) -> Solution:
         """The fit of the only group without nuisances, but for the gain of a nominal supply; the fit itself where it
@@ -506,16 +492,3 @@ class Fit:
         kind = question.covariance
         uncertainty = trust(solution.solver, solution, SANDWICH if kind == AUTOREGRESSIVE else kind)
         return find_breakaway(solution, names, uncertainty, progress)
-
-
-def _is_white(solution: Solution) -> bool:
-    """Whether the errors of a fit remember nothing."""
-    return trust(solution.solver, solution, AUTO).kind != SANDWICH
-
-
-def _in_each_group(names: Iterable[str], problem: Problem) -> list[str]:
-    """Names with those of each group written out: KEY stands for KEY@GROUP of all groups."""
-    full_names: list[str] = []
-    for name in names:
-        full_names += [full_name for full_name in problem.names if full_name.startswith(f"{name}{AT}")] or [name]
-    return list(dict.fromkeys(full_names))

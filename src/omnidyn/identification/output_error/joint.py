@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -223,3 +223,11 @@ def joint_start(
             values[k].append(float(value))
         states += point.states
     return Point(np.array([float(np.median(value)) for value in values]), tuple(states))
+
+
+def in_each_group(names: Iterable[str], problem: Problem) -> list[str]:
+    """Names with those of each group written out: KEY stands for KEY@GROUP of all groups."""
+    full_names: list[str] = []
+    for name in names:
+        full_names += [full_name for full_name in problem.names if full_name.startswith(f"{name}{AT}")] or [name]
+    return list(dict.fromkeys(full_names))

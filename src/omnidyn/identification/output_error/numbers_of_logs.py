@@ -35,7 +35,8 @@ LATENCY_ERRORS = 2.0  # standard errors within which a latency is like none
 def latencies_like_zero(problem: Problem, values: FloatArray, uncertainty: Trust) -> tuple[str, ...]:
     """Names of latencies that 0 may stand for: within LATENCY_ERRORS standard errors of it were all else exact.
 
-    So the other numbers, which were found beside it, predict the same without it.
+    So the other numbers, which were found beside it, predict the same without it. A current jumps with the voltage: one
+    that was read just before a command is of the voltage before, and late by next to nothing; by 0 it is of the next.
     """
     names = [p.name for p in problem.parameters]
     spreads = np.diag(uncertainty.covariance)
@@ -48,7 +49,9 @@ def latencies_like_zero(problem: Problem, values: FloatArray, uncertainty: Trust
     return tuple(
         names[j]
         for j, std in zip(identified.tolist(), alone.tolist(), strict=True)
-        if problem.parameters[j].part == LATENCY and 0.0 < abs(values[j]) <= LATENCY_ERRORS * std
+        if problem.parameters[j].part == LATENCY
+        and 0.0 < abs(values[j]) <= LATENCY_ERRORS * std
+        and not (names[j] == f"{LATENCY}.current" and values[j] > 0.0)
     )
 
 

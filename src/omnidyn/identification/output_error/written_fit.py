@@ -19,8 +19,9 @@ from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.linear.free_run import FreeRun, free_run, margins_of
 from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.problem.parameters import AT
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Normal, Solution
-from omnidyn.identification.output_error.trust.uncertainty import trust
+from omnidyn.identification.output_error.trust.uncertainty import SANDWICH, trust
 from omnidyn.model.actuation import DEAD_BAND
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress
@@ -94,6 +95,29 @@ def best_with_force(solution: Solution, forced_solutions: Sequence[Solution]) ->
     }
     notes = (*solution.notes, Statement("constant_force", WARNING, numbers=numbers))
     return replace(forced_solutions[k], plain_solution=solution.plain_solution, notes=notes)
+
+
+def is_white(solution: Solution) -> bool:
+    """Whether the errors of a fit remember nothing."""
+    return trust(solution.solver, solution, AUTO).kind != SANDWICH
+
+
+def with_dead_band(
+    solution: Solution, chosen_solution: Solution, beside: Callable[..., Solution], progress: FitProgress
+) -> Solution:
+    """The chosen fit, or one with a dead band of the driver beside the nuisances of `solution`, where that pays.
+
+    Of an engine that marches each number more takes its time, so first a score test (C. R. Rao, 1948) says whether the
+    likelihood asks for it: one simulation, no step. beside: makes the fit with other nuisances, `Fit.beside`.
+    """
+    names = solution.solver.problem.nuisances
+    if DEAD_BAND in names:
+        return chosen_solution
+    inner_progress = progress.aside("once more with a dead band")
+    begun_fit = beside(solution, [*names, DEAD_BAND], inner_progress, limit=0)
+    if not gains_much(begun_fit):
+        return chosen_solution
+    return better_with_dead_band(chosen_solution, begun_fit.gone_on(inner_progress))
 
 
 def gains_much(begun_fit: Solution) -> bool:
