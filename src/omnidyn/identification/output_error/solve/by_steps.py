@@ -5,7 +5,7 @@ from __future__ import annotations
 from omnidyn.identification.output_error.engines.engine import FitEngine
 from omnidyn.identification.output_error.engines.implicit import SPEED_TOLERANCE
 from omnidyn.identification.output_error.problem.problem import Problem
-from omnidyn.identification.output_error.solve.first_point import coarse_point, point_of
+from omnidyn.identification.output_error.solve.first_point import better_latencies, coarse_point, point_of
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import MAX_ITERATIONS, NEAR_PRECISION, Solution, Solver
 
@@ -36,12 +36,14 @@ def solve_by_steps(
         return solver.minimise(point_of(base_solution, problem), limit, progress, scales=scales)
     coarse_state = coarse_point(problem, nu, progress)
     halfway_engine = kind.of(problem, HALFWAY_TOLERANCE)
-    nearer_solution = Solver(problem, halfway_engine, nu, NEAR_PRECISION, counts_ticks=False).minimise(
+    halfway_solver = Solver(problem, halfway_engine, nu, NEAR_PRECISION, counts_ticks=False)
+    nearer_solution = halfway_solver.minimise(
         coarse_state.point, progress=progress, scales=coarse_state.variance if nu else None
     )
+    nearer_state = better_latencies(halfway_solver, nearer_solution.state)
     return solver.minimise(
-        nearer_solution.state.point,
+        nearer_state.point,
         progress=progress,
         blocked_parameters=nearer_solution.blocked_parameters,
-        scales=nearer_solution.state.variance if nu else None,
+        scales=nearer_state.variance if nu else None,
     )

@@ -77,7 +77,8 @@ def _with_latencies(solver: Solver, start_state: State) -> State:
     if not latency_indices:
         return start_state
     row = problem.pieces[0].record.step_of(slice(2 * LATENCIES + 1))
-    latencies = [0.0, *(row * k for k in (-0.5, 0.5, 1.5, 2.5, 4.5, 8.5)), 0.02, 0.05, 0.1]
+    few = [0.0, *(row * k for k in (-0.5, 0.5, 1.5, 2.5, 4.5, 8.5)), 0.02, 0.05, 0.1]
+    latencies = [*dict.fromkeys((*few, *point.values[latency_indices].tolist()))]  # what delays one often delays all
 
     def cost(latency: float) -> FloatArray:
         values = point.values.copy()
@@ -109,12 +110,24 @@ def coarse_point(problem: Problem, nu: float, progress: FitProgress) -> State:
     solver = _by_row(problem, nu)
     short, start_point = problem.shortened(FEW_ROWS, beyond_rest=True), moving_start(problem, nu, progress)
     if short is problem:
-        return solver.minimise(start_point, progress=progress).state
-    short_point = (
-        _by_row(short, nu).minimise(start_point, progress=progress.aside("a part of the log first")).state.point
-    )
+        return _descended(solver, start_point, progress)
+    short_point = _descended(_by_row(short, nu), start_point, progress.aside("a part of the log first")).point
     states = [solver.state(point) for point in (start_point, short_point)]
     return solver.minimise(min(states, key=lambda state: state.objective).point, progress=progress).state
+
+
+def _descended(solver: Solver[Problem], point: Point, progress: FitProgress) -> State:
+    """The state near the best point, and near that with other latencies where they are clearly better there."""
+    state = solver.minimise(point, progress=progress).state
+    late_state = better_latencies(solver, state)
+    return state if late_state is state else solver.minimise(late_state.point, progress=progress).state
+
+
+def better_latencies(solver: Solver, state: State) -> State:
+    """The state, or that with other latencies where it is clearly better: that of a current, which no descent brings
+    across a row, may have gone away before the other numbers were right."""
+    late_state = _with_latencies(solver, state)
+    return late_state if late_state.objective < state.objective - CLEARLY else state
 
 
 def _by_row(problem: Problem, nu: float) -> Solver[Problem]:
@@ -128,18 +141,21 @@ def _precision(problem: Problem) -> float:
 
 
 def _motors_first(problem: Problem, point: Point, nu: float, progress: FitProgress) -> State:
-    """The state near the best point with every latency at its start.
+    """The state near the best point with every latency as it begins.
 
     The latency of a current meets a jump at every row: a motor that is a wrong guess brings it to the wrong side of it,
     and no descent brings it back. Of a path, half the force a tenth of a second earlier looks like the whole one: a
     valley that ends in another minimum. So motors come first.
     """
-    return _by_row(_on_time(problem), nu).minimise(point, progress=progress.aside("motors first")).state
+    return _by_row(_on_time(problem, point), nu).minimise(point, progress=progress.aside("motors first")).state
 
 
-def _on_time(problem: Problem) -> Problem:
-    """The problem with every latency held at its start."""
-    parameters = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
+def _on_time(problem: Problem, point: Point) -> Problem:
+    """The problem with every latency held at that of a point."""
+    parameters = [
+        replace(p, low=value, high=value) if p.part == LATENCY else p
+        for p, value in zip(problem.parameters, point.values.tolist(), strict=True)
+    ]
     return replace(problem, parameters=tuple(parameters))
 
 
@@ -189,7 +205,7 @@ def _by_rates(problem: Problem, point: Point, nu: float, progress: FitProgress) 
     went too far before, and no descent gets across the level at which it would rest. Rates of few, noisy rows say less
     than their path, so that the better one of both is taken.
     """
-    held_problem = _on_time(problem)
+    held_problem = _on_time(problem, point)
     solver = Solver(held_problem, Rates(rolling_engine(held_problem)), nu, _precision(problem), counts_ticks=False)
     rate_point = solver.minimise(point, progress=progress.aside("rates before paths")).state.point
     return Point(rate_point.values, point.states)
@@ -235,6 +251,8 @@ def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
         start_points.append(_by_rates(short, best, nu, progress))
     parts = {p.part for p in problem.parameters}
     if LATENCY in parts and (MOTOR in parts or problem.where(CURRENTS) >= 0):
+        # late logs look like other motors, and other motors like late logs: both begin it
+        start_points += [_with_latencies(solver, solver.state(start)).point for start in start_points]
         states = [_motors_first(short, start, nu, progress) for start in start_points]
         return _with_latencies(solver, min(states, key=lambda state: state.objective)).point
     return min(start_points, key=lambda start: solver.state(start).objective) if len(start_points) > 1 else best
