@@ -1,6 +1,6 @@
 """Where the fit of late currents begins, by a simulator that shares no code with omnidyn.
 
-A current answers its voltage at once: its likelihood jumps wherever a latency passes a row, and no descent crosses that.
+A current answers its voltage at once: its likelihood jumps wherever a latency passes a row, which no descent crosses.
 """
 
 import numpy as np
