@@ -69,13 +69,28 @@ def test_the_legs_that_are_left_are_driven(plan):
     leg = program.legs[len(program.legs) // 2]  # in its middle: at the end of one the last row decides
     record = stopped_at(program, 0.5 * (leg.first + leg.end) * program.dt)
     rest = rest_of(program, [record.run])
-    assert len(rest.legs) == len(program.legs) - record.legs
+    first = len(program.legs) - len(rest.legs)
+    assert record.legs - 4 <= first <= record.legs
     assert rest.legs[-1].words == program.legs[-1].words
     again = stopped_at(rest, rest.seconds - 8.0)  # and a second stop, of the rest
     last = rest_of(program, [record.run, again.run])
     assert last.legs[-1].words == program.legs[-1].words
     assert 8.0 < last.seconds < 12.0
     assert last.source == f"the rest of {program.source}"
+
+
+def test_the_rest_begins_where_the_robot_is_put_back_to(plan):
+    """A way back that is driven alone ends as far on the other side, and what follows leaves the room from there."""
+    program = read_program(plan)
+    begins = [(0.0, 0.0), *(leg.pose[:2] for leg in program.legs)]
+    backs = [k for k in range(len(program.legs)) if np.hypot(*begins[k]) > 0.3]
+    assert len(backs) > 4
+    for k in backs[:4]:
+        record = stopped_at(program, 0.5 * (program.legs[k].first + program.legs[k].end) * program.dt)
+        rest = rest_of(program, [record.run])
+        first = len(program.legs) - len(rest.legs)
+        assert first < k and np.hypot(*begins[first]) < 0.1
+        assert np.abs(np.asarray(rest.predicted.pose)[:, :2]).max() < 1.2
 
 
 def test_a_log_of_another_program_with_the_same_wheels_is_refused(plan):

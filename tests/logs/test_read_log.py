@@ -53,6 +53,13 @@ def test_heading_is_unwrapped(tmp_path):
     np.testing.assert_allclose(read_log(path).pose[:, 2], [6.2, 0.1 + 2 * np.pi, np.nan, 6.1, 6.1])
 
 
+def test_a_heading_that_counts_turns_keeps_them_over_missing_rows(tmp_path):
+    """From 0.2 to 3.6 rad, and from there beyond a turn, while a camera saw nothing; and its jump back by a turn."""
+    path = write(tmp_path, "t_s,heading_rad,x_m\n0,0.2,0\n0.1,,0\n0.2,3.6,0\n0.3,5.5,0\n0.4,7.0,0\n0.5,0.8,0\n")
+    heading = [0.2, np.nan, 3.6, 5.5, 7.0, 0.8 + 2 * np.pi]
+    np.testing.assert_allclose(read_log(path).pose[:, 2], heading)
+
+
 def test_epoch_time_keeps_its_digits(tmp_path):
     path = write(tmp_path, "t_ns,w1_rad_s\n1700000000000000000,1\n1700000000010000000,2\n1700000000020000000,3\n")
     run = read_log(path)

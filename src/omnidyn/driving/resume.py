@@ -16,11 +16,14 @@ SHORTEST = 3.0  # [s] that are worth a drive
 SAME, SAME_SHARE = 1e-3, 0.8  # of the largest input; of the rows: a row may be left out of a log
 LATE = 0.5  # [s] that a row may be late beside the one before
 SLOWER = 0.25  # of the time: that all of it may take longer
+LEGS_OF_MOVE = 4  # at most, of a move that a plan makes: there and back, to both sides
+MIDDLE = 0.1  # [m] from the middle, which is no farther than a robot is put back to
 REMEDY = "give the logs of this program in the order in which they were driven"
 
 
 def rest_of(program: DriveProgram, runs: Sequence[Run]) -> DriveProgram:
-    """What is to be driven after a drive of a program was stopped: from the beginning of the leg that was not ended.
+    """What is to be driven after a drive of a program was stopped: from the beginning of the leg that was not ended, or
+    of its move, where that began in the middle of the room.
 
     Half a leg tells little; with the legs that are left both logs tell at least what the whole would have told.
 
@@ -35,7 +38,9 @@ def rest_of(program: DriveProgram, runs: Sequence[Run]) -> DriveProgram:
         rows = _driven_rows(program, run)
         if not rows:
             continue
-        leg = next((k for k, leg in enumerate(program.legs) if leg.end > rows), len(program.legs))
+        leg = _from_the_middle(
+            program, next((k for k, leg in enumerate(program.legs) if leg.end > rows), len(program.legs))
+        )
         left = program.seconds - program.legs[leg].first * program.dt if leg < len(program.legs) else 0.0
         if left < SHORTEST:
             raise InsufficientDataError(
@@ -47,6 +52,14 @@ def rest_of(program: DriveProgram, runs: Sequence[Run]) -> DriveProgram:
             )
         program = replace(program.from_leg(leg), source=f"the rest of {source}")
     return program
+
+
+def _from_the_middle(program: DriveProgram, leg: int) -> int:
+    """The last leg up to this one that begins in the middle, where the robot is put back to; this one, where no leg of
+    the same move does: the way back alone would lead as far to the other side, and all that follows with it."""
+    starts = [(0.0, 0.0), *(other.pose[:2] for other in program.legs)]
+    legs = range(leg, max(leg - LEGS_OF_MOVE, -1), -1)
+    return next((k for k in legs if np.hypot(*starts[k]) < MIDDLE), leg)
 
 
 def _driven_rows(program: DriveProgram, run: Run) -> int:

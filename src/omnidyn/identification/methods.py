@@ -13,7 +13,6 @@ from dataclasses import Field, dataclass, field, fields
 from functools import cache
 from typing import Any, ClassVar, Literal, get_args, get_type_hints
 
-from omnidyn.arguments import is_number, is_whole
 from omnidyn.errors import InputError
 
 AUTO, NONE = "auto", "none"
@@ -139,6 +138,8 @@ def _shares(window: Any) -> tuple[float, float] | None:
 
 def _draws(count: Any) -> int:
     """A number of draws. Raises InputError for what is none."""
+    from omnidyn.arguments import is_whole  # brings NumPy, which options of the command line do without
+
     if not is_whole(count) or count < 0:
         raise InputError("not a number of draws", got=count, expected="0 or a whole number above it", where="bootstrap")
     return int(count)
@@ -146,6 +147,8 @@ def _draws(count: Any) -> int:
 
 def _tick(size: Any) -> float | None:
     """The step of an encoder [rad], None where the log tells it. Raises InputError for what is no size."""
+    from omnidyn.arguments import is_number  # brings NumPy, as above
+
     if size is not None and (not is_number(size) or not 0.0 <= size < math.inf):
         raise InputError("not the step of an encoder", got=size, expected="0 rad or more, or None", where="tick_rad")
     return size

@@ -38,8 +38,12 @@ def world_to_body(heading: ArrayLike) -> FloatArray:
 
 
 def unwrapped(angle: FloatArray, period: float = 2.0 * math.pi) -> FloatArray:
-    """The angle without its jumps by a period, same unit. Shape (rows,); what is missing (NaN) stays missing."""
+    """The angle without its jumps by a period, same unit. Shape (rows,); what is missing (NaN) stays missing.
+
+    One that leaves a period counts turns: half a turn behind missing rows is no jump of it, nearly a whole one is.
+    """
     finite = np.isfinite(angle)
     smooth = angle.copy()
-    smooth[finite] = np.unwrap(angle[finite], period=period)
+    counts_turns = finite.any() and np.ptp(angle[finite]) > period
+    smooth[finite] = np.unwrap(angle[finite], discont=0.75 * period if counts_turns else None, period=period)
     return smooth

@@ -83,7 +83,7 @@ def begun(layout, every=False):
     solution = solver.minimise(solver.problem.start(), limit=0)
     problem, point = solution.solver.problem, solution.state.point
     bench = Workbench(problem, point, type(solver.engine), motions(problem, point), (0.5,))
-    return solution, bench, [*candidates(bench), *unoffered(bench)]
+    return solution, bench, [*candidates(bench), *unoffered()]
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)

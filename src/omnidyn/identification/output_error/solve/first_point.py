@@ -126,6 +126,8 @@ def _descended(solver: Solver[Problem], point: Point, progress: FitProgress) -> 
 def better_latencies(solver: Solver, state: State) -> State:
     """The state, or that with other latencies where it is clearly better: that of a current, which no descent brings
     across a row, may have gone away before the other numbers were right."""
+    if solver.problem.where(CURRENTS) < 0:
+        return state
     late_state = _with_latencies(solver, state)
     return late_state if late_state.objective < state.objective - CLEARLY else state
 
@@ -251,8 +253,8 @@ def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
         start_points.append(_by_rates(short, best, nu, progress))
     parts = {p.part for p in problem.parameters}
     if LATENCY in parts and (MOTOR in parts or problem.where(CURRENTS) >= 0):
-        # late logs look like other motors, and other motors like late logs: both begin it
-        start_points += [_with_latencies(solver, solver.state(start)).point for start in start_points]
+        if problem.where(CURRENTS) >= 0:  # late currents look like other motors, and other motors like late currents
+            start_points += [_with_latencies(solver, solver.state(start)).point for start in start_points]
         states = [_motors_first(short, start, nu, progress) for start in start_points]
         return _with_latencies(solver, min(states, key=lambda state: state.objective)).point
     return min(start_points, key=lambda start: solver.state(start).objective) if len(start_points) > 1 else best
