@@ -89,7 +89,8 @@ def test_the_rest_begins_where_the_robot_is_put_back_to(plan):
         record = stopped_at(program, 0.5 * (program.legs[k].first + program.legs[k].end) * program.dt)
         rest = rest_of(program, [record.run])
         first = len(program.legs) - len(rest.legs)
-        assert first < k and np.hypot(*begins[first]) < 0.1
+        assert first < k
+        assert np.hypot(*begins[first]) < 0.1
         assert np.abs(np.asarray(rest.predicted.pose)[:, :2]).max() < 1.2
 
 
@@ -148,7 +149,7 @@ def test_a_drive_whose_loop_was_held_up_again_and_again_is_known_again(plan):
     leg = next(leg for leg in program.legs if leg.end > rows)
     rest = rest_of(program, [log])
     np.testing.assert_array_equal(rest.inputs[-len(program.inputs) + leg.first :], program.inputs[leg.first :])
-    assert rest.legs[0].words == leg.words
+    assert leg.words in [begun.words for begun in rest.legs[:4]]  # its move begins in the middle
     other = omnidyn.Run(t=t, voltage=draws.permutation(program.inputs[:rows]))
     with pytest.raises(InputError, match="not a log of this program"):
         rest_of(program, [other])

@@ -54,9 +54,10 @@ def test_heading_is_unwrapped(tmp_path):
 
 
 def test_a_heading_that_counts_turns_keeps_them_over_missing_rows(tmp_path):
-    """From 0.2 to 3.6 rad, and from there beyond a turn, while a camera saw nothing; and its jump back by a turn."""
-    path = write(tmp_path, "t_s,heading_rad,x_m\n0,0.2,0\n0.1,,0\n0.2,3.6,0\n0.3,5.5,0\n0.4,7.0,0\n0.5,0.8,0\n")
-    heading = [0.2, np.nan, 3.6, 5.5, 7.0, 0.8 + 2 * np.pi]
+    """It turns on by 3.4 rad, more than half a turn, while a camera sees nothing."""
+    heading = [*np.arange(0.0, 2.1, 0.4), *[np.nan] * 8, *np.arange(5.4, 7.1, 0.4)]
+    rows = [f"{0.1 * k:.1f},{'' if np.isnan(angle) else round(angle, 1)},0" for k, angle in enumerate(heading)]
+    path = write(tmp_path, "\n".join(["t_s,heading_rad,x_m", *rows, ""]))
     np.testing.assert_allclose(read_log(path).pose[:, 2], heading)
 
 
