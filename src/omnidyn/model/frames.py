@@ -44,6 +44,7 @@ def unwrapped(angle: FloatArray, period: float = 2.0 * math.pi) -> FloatArray:
     """
     finite = np.isfinite(angle)
     smooth = angle.copy()
-    counts_turns = finite.any() and np.ptp(angle[finite]) > period
-    smooth[finite] = np.unwrap(angle[finite], discont=0.75 * period if counts_turns else None, period=period)
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers that no sensor gives: readers refuse them by name
+        counts_turns = finite.any() and np.ptp(angle[finite]) > period
+        smooth[finite] = np.unwrap(angle[finite], discont=0.75 * period if counts_turns else None, period=period)
     return smooth

@@ -282,9 +282,9 @@ SENTENCES = {
     ),
     "size_fitted": Sentence(_size_fitted, "measure {keys}, and write them into the robot file"),
     "driver_dead_band": Sentence(
-        "the driver passes on nothing of the first {value:.3g} V (a dead band): with it a free run misses {with:%.3g} "
-        "% of the spread of the outputs on held-out blocks of the log, {error:%.3g} % without ({better} of {blocks} "
-        "blocks are predicted better)",
+        "the driver passes on nothing of the first {values[0]:.3g} V (a dead band): with it a free run misses "
+        "{with:%.3g} % of the spread of the outputs on held-out blocks of the log, {error:%.3g} % without "
+        "({better} of {blocks} blocks are predicted better)",
         "measure it: the voltage at which a wheel off the ground sets off; Coulomb friction at the wheels looks alike",
     ),
     "constant_force": Sentence(

@@ -56,7 +56,7 @@ from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE
 from omnidyn.identification.output_error.written_fit import (
     SCREENING_STEPS,
     beside_given,
-    best_with_force,
+    best_with,
     better_of,
     is_white,
     screened,
@@ -353,7 +353,8 @@ class Fit:
             ]
         except UnsupportedError:  # an engine that knows no constant force
             return chosen_solution
-        return best_with_force(chosen_solution, screened(chosen_solution, begun_fits, inner_progress))
+        forced_solutions = screened(chosen_solution, begun_fits, inner_progress)
+        return best_with(chosen_solution, forced_solutions, (PUSH, TILT), "constant_force")
 
     def _plain(self, solution: Solution, progress: FitProgress) -> Solution:
         """The fit of the only group without nuisances, but for the gain of a nominal supply; the fit itself where it

@@ -61,44 +61,37 @@ def screened(solution: Solution, begun_fits: Sequence[Solution], progress: Progr
     return [begun_fit.gone_on(progress) for begun_fit, gain in pairs if gain >= least_gain]
 
 
-def best_with_force(solution: Solution, forced_solutions: Sequence[Solution]) -> Solution:
-    """A fit, or the one of `forced_solutions`, which have a constant force each, that predicts best and clearly better.
+def best_with(solution: Solution, other_solutions: Sequence[Solution], causes: Sequence[str], code: str) -> Solution:
+    """A fit, or the one of others, which have one of the nuisances `causes` each, that predicts held-out blocks best:
+    where it does so clearly, and its nuisance is seen. code: of the statement that says so.
 
-    A step from the fit without does not see it: dry friction takes up to as much, and the numbers have gone elsewhere.
+    A step from the fit without does not see a constant force: dry friction takes up to as much, and the numbers have
+    gone elsewhere.
     """
-    if not forced_solutions:
+    if not other_solutions:
         return solution
-    margins = margins_of([solution, *forced_solutions])
-    run_without_force, runs = (
-        free_run(solution, margins),
-        [free_run(forced_solution, margins) for forced_solution in forced_solutions],
-    )
+    margins = margins_of([solution, *other_solutions])
+    own_run, *runs = [free_run(one, margins) for one in (solution, *other_solutions)]
     k = int(np.argmin([run.error for run in runs]))
-    comparison = runs[k].improvement(run_without_force)
-    if run_without_force.adds_up or comparison is None:
+    comparison, other = runs[k].improvement(own_run), other_solutions[k]
+    if comparison is None:
         return solution
-    problem, values = forced_solutions[k].solver.problem, forced_solutions[k].state.point.values
-    force_indices = [problem.where(name) for name in problem.names if name not in solution.solver.problem.names]
+    names = tuple(name for name in other.solver.problem.names if name.partition(".")[0] in causes)
+    indices = [other.solver.problem.where(name) for name in names]
+    values = other.state.point.values[indices]
     try:
-        std = trust(forced_solutions[k].solver, forced_solutions[k], AUTO).std
-    except np.linalg.LinAlgError:  # the logs do not tell the force from the other numbers
+        std = trust(other.solver, other, AUTO).std[indices]
+    except np.linalg.LinAlgError:  # the logs do not tell it from the other numbers
         return solution
-    if not (np.abs(values[force_indices]) > FORCE_ERRORS * std[force_indices]).any():
+    if not (np.abs(values) > FORCE_ERRORS * std).any():
         return solution
-    names = tuple(problem.names[j] for j in force_indices)
-    numbers = {
-        "keys": names,
-        "values": tuple(values[force_indices].tolist()),
-        "error": run_without_force.error,
-        "with": runs[k].error,
-        **comparison.counts,
-    }
-    notes = (*solution.notes, Statement("constant_force", WARNING, numbers=numbers))
-    return replace(forced_solutions[k], plain_solution=solution.plain_solution, notes=notes)
+    numbers = {"keys": names, "values": tuple(values.tolist()), "error": own_run.error, "with": runs[k].error}
+    notes = (*solution.notes, Statement(code, WARNING, numbers=numbers | comparison.counts))
+    return replace(other, plain_solution=solution.plain_solution, notes=notes)
 
 
 def is_white(solution: Solution) -> bool:
-    """Whether the errors of a fit remember nothing."""
+    """Whether the errors of a fit are white."""
     return trust(solution.solver, solution, AUTO).kind != SANDWICH
 
 
@@ -108,7 +101,8 @@ def with_dead_band(
     """The chosen fit, or one with a dead band of the driver beside the nuisances of `solution`, where that pays.
 
     Of an engine that marches each number more takes its time, so first a score test (C. R. Rao, 1948) says whether the
-    likelihood asks for it: one simulation, no step. beside: makes the fit with other nuisances, `Fit.beside`.
+    likelihood asks for it: one simulation, no step. Errors may add up: a dead band, unlike a constant force, does not
+    make up for what drifts. beside: makes the fit with other nuisances, `Fit.beside`.
     """
     names = solution.solver.problem.nuisances
     if DEAD_BAND in names:
@@ -117,36 +111,13 @@ def with_dead_band(
     begun_fit = beside(solution, [*names, DEAD_BAND], inner_progress, limit=0)
     if not gains_much(begun_fit):
         return chosen_solution
-    return better_with_dead_band(chosen_solution, begun_fit.gone_on(inner_progress))
+    return best_with(chosen_solution, [begun_fit.gone_on(inner_progress)], (DEAD_BAND,), "driver_dead_band")
 
 
 def gains_much(begun_fit: Solution) -> bool:
     """Whether the likelihood of a fit that has taken no step would grow by FORCE_GAIN, as far as its slopes tell."""
     normal = Normal(begun_fit.solver, begun_fit.state)
     return 0.5 * normal.distance_without(normal.held) >= FORCE_GAIN
-
-
-def better_with_dead_band(solution: Solution, banded_solution: Solution) -> Solution:
-    """A fit, or the one with a dead band of the driver where that is seen and predicts clearly better.
-
-    Angles that add up count: unlike a constant force, a dead band does not make up for errors that drift.
-    """
-    margins = margins_of([solution, banded_solution])
-    own_run, banded_run = free_run(solution, margins), free_run(banded_solution, margins)
-    comparison = banded_run.improvement(own_run)
-    if comparison is None:
-        return solution
-    j = banded_solution.solver.problem.where(DEAD_BAND)
-    value = float(banded_solution.state.point.values[j])
-    try:
-        std = trust(banded_solution.solver, banded_solution, AUTO).std[j]
-    except np.linalg.LinAlgError:  # the logs do not tell it from the other numbers
-        return solution
-    if not value > FORCE_ERRORS * std:
-        return solution
-    numbers = {"value": value, "error": own_run.error, "with": banded_run.error, **comparison.counts}
-    notes = (*solution.notes, Statement("driver_dead_band", WARNING, numbers=numbers))
-    return replace(banded_solution, plain_solution=solution.plain_solution, notes=notes)
 
 
 def why_white(white: Solution, weighed_fit: Weighed) -> Statement | None:
