@@ -75,11 +75,11 @@ def test_it_begins_with_ramps_that_leave_the_time_to_what_tells_more(made):
     assert made.moves[3][0] < 0.2 * made.seconds
 
 
-def test_the_fit_of_its_log_is_as_sure_as_it_was_told(made, draws):
+def test_the_fit_of_its_log_is_as_sure_as_it_was_told(made):
     """Of robots 30 % off: what identify says of each number beside its truth, and beside the prediction."""
     rng = np.random.default_rng(3)
     z, halves = [], []
-    for _ in range(draws(20)):
+    for _ in range(20):
         robot = off(made.robot, rng)
         run = driven(robot, made.commands())
         log = omnidyn.Run(
