@@ -18,7 +18,7 @@ from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.statement import WARNING, Statement
 
 MIN_DT, MAX_DT = 1e-9, 3600.0
-SAME_TIME = 1e-9  # of a tick: times that are nearer are one
+SAME_TIME = 1e-4  # of a tick: times that are nearer are one, for the times of a log have six decimals or so
 
 
 class Commands(NamedTuple):
@@ -124,7 +124,7 @@ def _from_duty(robot: Robot, rows: FloatArray, steps: FloatArray, supply: ArrayL
 def on_ticks(
     robot: Robot, held_commands: Commands, now: float = 0.0
 ) -> tuple[FloatArray, FloatArray, BoolArray, NDArray[np.intp]]:
-    """A speed loop's own time grid: rows that begin `now` [s] after its first tick, cut at its ticks.
+    """A speed loop's own time grid: rows that begin `now` [s] after a tick, cut at its ticks.
 
     Returns (dt, set point, whether the loop runs at the start of the row, index where each original row begins, and
     the end). A command counts from the first tick at or after its start, as in a firmware that polls.
@@ -132,8 +132,7 @@ def on_ticks(
     assert held_commands.set_point is not None
     if len(held_commands.dt) == 1:
         return _one_on_ticks(robot, held_commands.set_point, now, float(held_commands.dt[0]))
-    edges = np.zeros(len(held_commands.dt) + 1)
-    np.cumsum(held_commands.dt, out=edges[1:])
+    edges = row_edges(held_commands.dt)
     period = 1.0 / (robot.drive.rate or np.inf)
     first, end = (math.ceil(time / period - SAME_TIME) for time in (now, now + float(edges[-1])))
     ticks = np.arange(first, end) * period - now
@@ -160,6 +159,19 @@ def _one_on_ticks(
     begins[0] = at_once
     grid = np.array(times)
     return grid[1:] - grid[:-1], set_point.repeat(len(begins), axis=0), begins, np.array([0, len(begins)])
+
+
+def row_edges(dt: FloatArray) -> FloatArray:
+    """When rows of these lengths [s] begin, and the last one ends. Equal rows do not add up their rounding errors."""
+    if len(dt) and (dt == dt[0]).all():
+        return np.arange(len(dt) + 1) * dt[0]
+    return np.concatenate(([0.0], np.cumsum(dt)))
+
+
+def phase(robot: Robot, now: float) -> float:
+    """How long ago the last tick of a speed loop was [s], at a time after any of its ticks: no rounding errors add up."""
+    period = 1.0 / (robot.drive.rate or np.inf)
+    return now - math.floor(now / period + SAME_TIME) * period
 
 
 def loop_gains(robot: Robot) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -17,7 +17,7 @@ from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import start_state
-from omnidyn.simulation.commands import Commands, as_floats, current_bounds, loop_gains, on_ticks
+from omnidyn.simulation.commands import Commands, as_floats, current_bounds, loop_gains, on_ticks, phase
 from omnidyn.simulation.contract import Conditions, Engine, Motion
 from omnidyn.simulation.coulomb.door import moved, run, run_looped
 from omnidyn.simulation.exact.exact_march import ExactMarch, why_not_exact
@@ -109,7 +109,7 @@ class ExactInductance(_PaperLaw):
 
 
 class Stepped(NamedTuple):
-    """A state of an engine that solves steps, `motion` being its own. now [s]: since the start; asked [V], total [V]:
+    """A state of an engine that solves steps, `motion` being its own. now [s]: since the last tick; asked [V], total [V]:
     the voltages and the integrals of the speed loop, shape (wheels,); count: what the solver met."""
 
     motion: Any
@@ -163,7 +163,8 @@ class _Stepping:
     def _after(self, state: Stepped, motion: Any, pose: FloatArray, rows: _SolverRows, count: Any) -> Stepped:
         if not rows.loop.period:
             return Stepped(motion, pose, state.now, state.asked, state.total, count)
-        return Stepped(motion, pose, state.now + float(rows.dt.sum()), rows.voltage[-1], rows.loop.sum, count)
+        now = phase(self._robot, state.now + float(rows.dt.sum()))
+        return Stepped(motion, pose, now, rows.voltage[-1], rows.loop.sum, count)
 
     def _volts(self, rows: _SolverRows, looped: bool) -> tuple[FloatArray, FloatArray | None]:
         """(the voltages at the motors, those that a speed loop asked for) of each row."""
