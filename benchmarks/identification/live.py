@@ -20,7 +20,9 @@ import omnidyn
 from benchmarks.identification import ordinary, ordinary_robots
 from benchmarks.size import WHOLE, scaled
 from benchmarks.table import Table, machine, one_core
-from benchmarks.ten_robots.robots import Sensors
+from benchmarks.ten_robots.robots import Sensors, cases, write_log
+from benchmarks.ten_robots.score import truths
+from omnidyn.cli import main
 from omnidyn.identification.live.rows import part
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.model.keys import BOX, Key
@@ -28,6 +30,7 @@ from tests.support.axebot_logs import NOISE, TRUTH, voltages, with_friction
 
 Array = np.ndarray[Any, Any]
 RUNS, BATCH, ORDINARY = scaled(100, 1), scaled(14, 1), scaled(4, 1)  # of each noise; of these beside the whole fit
+LOOPED = scaled(10, 1)
 SECONDS, RATE = 60.0, 100.0
 LATE, PUSH = 2, np.array([0.15, -0.1, 0.01])  # rows, and [N, N, N m]
 WITHIN = 0.15  # half an interval that is enough
@@ -240,6 +243,7 @@ def measure() -> Table:
             **{"false enough %": wrong_stops, "stop s": seconds, "stopped %": stopped_share},
         )  # fmt: skip
     _ordinary(table)
+    _looped(table)
     for kind in KINDS[:2]:
         table.add("<= 10 %", (share := fast(kind, wrong)) <= 10.0, what=f"1 kHz, {kind}", **{"cpu % of a core": share})
     return table
@@ -289,6 +293,38 @@ def _ordinary(table: Table) -> None:
     table.notes.append(
         "four wheels: of 30 s, by benchmarks/ten_robots/world.py; what a guess leaves unknown is not counted"
     )
+
+
+def _looped(table: Table) -> None:
+    """Four wheels behind a loop of 100 Hz, logged at 33 Hz: set speeds, speeds and currents, a file as `init` writes it."""
+    case = dataclasses.replace(next(case for case in cases() if case.name == "firmware"), seconds=40.0)
+    held, largest, stopped, cost = [], 0.0, 0, 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        path, file = Path(folder, "log.csv"), Path(folder, "robot.toml")
+        assert main(["init", "mine", *case.init, "-o", str(file)]) == 0
+        model = omnidyn.load_robot(file)
+        for seed in range(LOOPED):
+            write_log(case, seed, path)
+            log = omnidyn.read_log(path, model)
+            live, begun = omnidyn.Live(model), time.process_time()
+            for first in range(0, len(log), 33):
+                status = live.add(part(log, first, min(first + 33, len(log))))
+            cost += time.process_time() - begun
+            stopped += status.is_enough
+            truth = truths(case.world, live.robot_now, True)
+            for name, number in status.numbers.items():
+                if not number.is_unknown and truth.get(name):
+                    held.append(number.low <= truth[name] <= number.high)
+                    largest = max(largest, abs(errors(number, truth[name])))
+    table.add(
+        "92 to 100 %, z <= 5", float(np.mean(held)) >= 0.92 and largest <= Z_LIMIT,
+        what="four wheels behind a speed loop", runs=LOOPED,
+        **{
+            "hold at the end %": 100.0 * float(np.mean(held)), "largest z": largest,
+            "stopped %": 100.0 * stopped / LOOPED, "cpu % of a core": 100.0 * cost / LOOPED / case.seconds,
+        },
+    )  # fmt: skip
+    table.notes.append("behind a speed loop: 40 s, by the same simulator; what a guess leaves unknown is not counted")
 
 
 def fast(kind: str, robot: omnidyn.Robot, seconds: float = 120.0) -> float:

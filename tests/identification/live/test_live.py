@@ -299,12 +299,6 @@ def test_what_cannot_be_used_is_refused():
         omnidyn.Live(ROBOT, reference=omnidyn.load_robot("mecanum"))
     with pytest.raises(omnidyn.OmnidynError, match="unknown key; got nonsense"):
         omnidyn.Live(ROBOT, omnidyn.OutputError(free=("nonsense",)))
-    words = r"speed loop whose voltages are not logged.*got wheel_speed, wheel_speed_command; .*`identify`"
-    still = np.zeros((2, 3))
-    with pytest.raises(omnidyn.OmnidynError, match=words):
-        omnidyn.Live(omnidyn.load_robot("robotino")).add(
-            omnidyn.Run(t=[0.0, 0.1], wheel_speed=still, wheel_speed_command=still)
-        )
 
 
 def test_a_robot_with_a_speed_loop_is_followed_where_its_voltages_are_logged():
@@ -319,3 +313,58 @@ def test_a_robot_with_a_speed_loop_is_followed_where_its_voltages_are_logged():
         number = numbers[f"friction.axes.coulomb[{axis}]"]
         assert abs(number.value - truth) < number.high - number.low
         assert number.high - number.low < 0.1 * truth
+
+
+def looped_robot():
+    """The paper's robot behind a PI loop of 100 Hz, and 24 s of it: noisy speeds and currents, set speeds, no volts."""
+    robot = ROBOT.replace(drive=ROBOT.drive.replace(kind="speed", kp=0.25, ki=1.0, rate=100.0))
+    rng = np.random.default_rng(1)
+    command = np.repeat(rng.uniform(-1.0, 1.0, (48, 3)) * [0.6, 0.6, 4.0], 50, axis=0)
+    command[:20] = 0.0
+    run = omnidyn.simulate(robot, dt=0.01, twist_command=command)
+    speeds = run.wheel_speed + 0.3 * rng.standard_normal(run.wheel_speed.shape)
+    current = run.current + 0.05 * rng.standard_normal(run.current.shape)
+    return robot, omnidyn.Run(t=run.t, wheel_speed=speeds, current=current, twist_command=run.twist_command)
+
+
+def test_a_speed_loop_is_followed_through_its_set_speeds():
+    """Friction 1.5 times and gains half of the truth at first: all are found, and the end is the fit of the whole log."""
+    robot, log = looped_robot()
+    start = Key.parse("drive.kp_V_s_rad").set(Key.parse("drive.ki_V_rad").set(robot, 0.5), 0.125)
+    for axis, truth in enumerate(ROBOT.friction.axes.coulomb):
+        start = Key.parse(f"friction.axes.coulomb[{axis}]").set(start, 1.5 * truth)
+    live = omnidyn.Live(start, within=0.5)
+    for first in range(0, len(log), 100):
+        status = live.add(part(log, first, min(first + 100, len(log))))
+    finished = live.finish().numbers
+    for key in ("drive.kp_V_s_rad", "drive.ki_V_rad", *(f"friction.axes.coulomb[{axis}]" for axis in range(3))):
+        truth = Key.parse(key).get(robot)
+        for number in (status.numbers[key], finished[key]):
+            assert abs(number.value - truth) < 4.0 * number.std
+            assert number.std < 0.05 * truth
+    assert status.enough_at is not None
+    whole = omnidyn.identify(log, start, live.method).estimate
+    for key, std in whole.std.items():
+        assert abs(finished[key].value - whole.value[key]) < 0.3 * std
+
+
+def test_what_follows_a_gap_in_a_speed_loop_is_not_used():
+    robot, log = looped_robot()
+    gap = slice(900, 1000)
+    rows = np.delete(np.arange(len(log)), gap)
+    lost = log.replace(t=log.t[rows], **{name: value[rows] for name, value in log.channels.items()})
+    live, before = omnidyn.Live(robot), omnidyn.Live(robot)
+    status = live.add(lost)
+    before.add(part(log, 0, 900))
+    assert status.used_until == pytest.approx(8.99)
+    assert "nothing after the gap at 9.0 s is used" in str(status)
+    finished = live.finish().numbers
+    for key, number in before.finish().numbers.items():
+        assert finished[key].value == pytest.approx(number.value, abs=0.3 * number.std)
+
+
+def test_a_speed_loop_that_begins_in_motion_waits():
+    robot, log = looped_robot()
+    status = omnidyn.Live(robot).add(part(log, 400, 1200))
+    assert not status.numbers
+    assert "no log begins at rest" in status.waiting

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.arguments import check_order, is_number
-from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
+from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.live.change import MASSES, changes
 from omnidyn.identification.live.model import LiveModel, PredictedStretch
 from omnidyn.identification.live.rows import Rows, part
@@ -17,14 +17,17 @@ from omnidyn.identification.live.status import LiveNumber, LiveStatus
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.prepare import free_by_default, guesses
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH
+from omnidyn.identification.output_error.solve.loop import loop_keys
 from omnidyn.model.drive import SPEED
 from omnidyn.model.keys import Key, expand
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
 RESISTANCE = "motor.resistance_ohm"
 EVERY = 1.0  # [s] of the log between two answers
 STRETCH = 5.0  # [s] whose rows are predicted before they count
+LOOP_SHARE = 0.1  # of the log: so long at least is a stretch in a speed loop, each of which simulates the whole log
 FIRST = 4.0  # [s] of the log before the first fit
 SURE = 10.0  # [s] of the log in a whole fit that may say that the model leaves something out
 GROWTH, SOONER = 2.0, 1.15  # times as much log at which all is fitted anew; where that seems to be needed
@@ -45,13 +48,16 @@ class Live:
     Args:
         robot: What is known before.
         method: What is fitted, as for `identify`; by default friction, resistance, guesses of the file, latencies and
-            a constant push; with a reference mass and inertia instead of the resistance.
+            a constant push; with a reference mass and inertia instead of the resistance; through a speed loop friction,
+            gains that are not given, guesses and latencies.
         within: How wide half an interval may be, as a share of its number, to be enough; or key -> share, and then
             only these numbers count.
         reference: The robot as it was fitted before: what differs from it is said, as floor, payload or wear.
 
-    Raises InputError for what cannot be used, UnsupportedError for rows of set speeds without voltages or duties: those
-    of a speed loop in the firmware are fitted as a whole log only.
+    Rows of set speeds without voltages or duties are followed through the speed loop of the robot: from rest, up to the
+    first gap, for what the loop remembers is known no longer then. Its gains are fitted too where they are guesses.
+
+    Raises InputError for what cannot be used.
 
     >>> import numpy as np, omnidyn
     >>> robot, rng = omnidyn.load_robot("axebot"), np.random.default_rng(0)
@@ -83,9 +89,8 @@ class Live:
                 where="reference",
             )
         self.robot, self.reference = robot, reference
-        self.method = method or _default_method(robot, reference is not None)
-        self._fitted = _fitted(robot, self.method)
-        self._within = _shares(within, self._fitted, self.method)
+        self._asked, self._asked_within = method, within
+        self._ask(has_loop=False)
         self._rows, self._model = Rows(), None
         self._start = self._answered = math.nan
         self._fitted_rows, self._fitted_at = 0, 0.0
@@ -97,6 +102,12 @@ class Live:
         self._held_out: PredictedStretch | None
         self._unexplained: PredictedStretch | None
         self._status = LiveStatus(robot.name, waiting=self._waiting)
+
+    def _ask(self, has_loop: bool) -> None:
+        """Settle what is fitted. has_loop: the rows have set speeds and no voltages."""
+        self.method = self._asked or _default_method(self.robot, self.reference is not None, has_loop)
+        self._fitted = _fitted(self.robot, self.method)
+        self._within = _shares(self._asked_within, self._fitted, self.method)
 
     @property
     def status(self) -> LiveStatus:
@@ -128,15 +139,8 @@ class Live:
                 remedy="give the robot that the log is of",
                 where=run.source,
             )
-        if self.robot.drive.kind == SPEED and run.voltage is None and run.duty is None:
-            raise UnsupportedError(
-                "a speed loop whose voltages are not logged cannot be followed live",
-                got=", ".join(run.channels),
-                expected="the voltage or duty of each motor beside its set speed",
-                remedy="let the firmware log what it gives the motors; or log the drive to its end, and fit all of it "
-                "with `identify`, which simulates the loop",
-                where=run.source or "log",
-            )
+        if self._rows.count == 0 and self.robot.drive.kind == SPEED:
+            self._ask(has_loop=run.voltage is None and run.duty is None)
         repeated = self._rows.repeated(run)
         if len(run) == repeated:
             return
@@ -178,14 +182,17 @@ class Live:
                 self._was_reached = self._model is not None and self._is_reached()
             return
         model = self._model
-        model.take(self._rows, now)
-        if now - model.start < STRETCH:
+        stretch = max(STRETCH, LOOP_SHARE * (now - self._start)) if model.has_loop else STRETCH
+        is_whole = now - model.start >= stretch
+        if is_whole or not model.has_loop:
+            model.take(self._rows, now)
+        if not is_whole:
             return
         self._held_out = model.judge(now)
         self._missed += [self._held_out] if self._held_out.missed else []
         seems_enough = self._was_reached and self._held_out.predicted and self._is_reached()
         model.close(now)
-        age, is_small = now - self._start, self._rows.count <= FIT_ROWS
+        age, is_small = now - self._start, self._rows.count <= FIT_ROWS or model.has_loop
         has_grown = age >= GROWTH * (self._fitted_at - self._start) and self._fitted_rows < FIT_ROWS
         is_doubtful = bool(self._held_out.missed) or (seems_enough and self._enough_at is None)
         if has_grown or (is_doubtful and age >= SOONER * (self._fitted_at - self._start)):
@@ -199,7 +206,7 @@ class Live:
             stretches = (self._model.unexplained(self._rows, missed.start, missed.end) for missed in self._missed)
             self._unexplained = next(filter(None, stretches), None)
             self._enough_at = age if self._unexplained is None else None
-        if self._rows.count > MOST_ROWS:
+        if self._rows.count > MOST_ROWS and not model.has_loop:
             self._model.freeze()
             self._rows.forget(self._model.start - STRETCH)
 
@@ -207,7 +214,8 @@ class Live:
         """Fit the last rows anew, and all others at what comes out; where they tell nothing, what was before stays."""
         run = self._rows.between(-math.inf, now)
         assert run is not None
-        last = part(run, max(len(run) - FIT_ROWS, 0), len(run))
+        has_loop = self.robot.drive.kind == SPEED and run.voltage is None and run.duty is None
+        last = run if has_loop else part(run, max(len(run) - FIT_ROWS, 0), len(run))
         try:
             model = LiveModel(last, self.robot, self.method)
         except InsufficientDataError as error:
@@ -256,12 +264,17 @@ class Live:
             unexplained=self._unexplained,
             misfit=self._model.misfit if self._fitted_at - self._start >= SURE else (),
             changes=changed,
+            used_until=None if self._model.used_until is None else self._model.used_until - self._start,
             waiting="",
         )
 
 
-def _default_method(robot: Robot, is_compared: bool) -> OutputError:
-    """What is fitted where nothing is asked for. is_compared: with a fit before, which knows the resistance."""
+def _default_method(robot: Robot, is_compared: bool, has_loop: bool) -> OutputError:
+    """What is fitted where nothing is asked for. is_compared: with a fit before, which knows the resistance; through a
+    speed loop it and the masses show in its currents at best, and are fitted where they are guesses."""
+    if has_loop:
+        keys = (*loop_keys(robot, np.ones(N_AXES, bool)), *guesses(robot, has_loop=True))
+        return OutputError(free=tuple(dict.fromkeys(keys)), nuisances=(LATENCY,))
     more = MASSES if is_compared else tuple(map(str, expand(RESISTANCE, robot)))
     keys = (*free_by_default(robot), *guesses(robot), *more)
     return OutputError(free=tuple(dict.fromkeys(keys)), nuisances=(LATENCY, PUSH))

@@ -26,7 +26,8 @@ from omnidyn.identification.output_error.problem.differences import differences
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, pieces
 from omnidyn.identification.output_error.problem.parameters import MOST_LATENCY
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
-from omnidyn.identification.output_error.problem.record import record
+from omnidyn.identification.output_error.problem.record import Record, record
+from omnidyn.identification.output_error.solve.loop import loop_pieces
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
 from omnidyn.identification.output_error.trust.uncertainty import WHITE, Trust, trust
 from omnidyn.identification.structure.diagnosis import followed_themes
@@ -71,6 +72,7 @@ class LiveModel:
 
     misfit: what the residuals of the whole fit follow, nothing where the model leaves nothing out.
     fitted_at [s]: of the last row in the whole fit. start [s]: of the stretch that is not closed yet.
+    used_until [s]: of the row before the first gap in a log of set speeds, after which nothing is used; else None.
     """
 
     def __init__(self, run: Run, robot: Robot, question: OutputError) -> None:
@@ -90,19 +92,31 @@ class LiveModel:
         self.open = self._empty()
         self.recent: deque[Quadratic] = deque(maxlen=RECENT)
         self._engine = solver.engine
+        self.used_until = self._before_a_gap(self.group.records[0])
         self._solver = summing_solver(self.problem, self.sums)
         self._factor, self._quantile = np.ones(len(self.values)), weighed.uncertainty.quantile
         plain, whole = self._trust().std, weighed.uncertainty.std
         is_seen = np.isfinite(plain) & np.isfinite(whole) & (plain > 0.0)
         self._factor = np.where(is_seen, whole / np.where(is_seen, plain, 1.0), 1.0)
         self.uncertainty = self._trust()
-        self._open = self.uncertainty.open
+        self._starts: tuple[FloatArray, ...]
+        self._open, self._starts = self.uncertainty.open, ()
         self._begin()
 
+    @property
+    def has_loop(self) -> bool:
+        """Whether the voltage is that of a speed loop: what it remembers is known from the start of the log on only."""
+        return self._engine.has_loop
+
     def take(self, rows: Rows, end: float) -> None:
-        """Take the rows from the start of the open stretch to a time [s], and settle."""
+        """Take the rows from the start of the open stretch to a time [s], and settle.
+
+        Through a speed loop they only judge: a current jumps at each tick, so that the slope of a latency leads nowhere,
+        and the numbers move by steps that simulate the whole log.
+        """
         self.open = self.told_by(rows, self.start, end)
-        self._settle()
+        if not self.has_loop:
+            self._settle()
 
     def judge(self, end: float) -> PredictedStretch:
         """How well the open stretch was predicted by the numbers at its start."""
@@ -185,7 +199,7 @@ class LiveModel:
 
     def told_by(self, rows: Rows, start: float, end: float) -> Quadratic:
         """What the rows after one time up to another [s] tell near the numbers as they are."""
-        run = rows.between(start - MOST_LATENCY, end)
+        run = rows.between(-np.inf if self.has_loop else start - MOST_LATENCY, end)
         made = None if run is None else self._problem_of(run, start)
         if made is None:
             return self._empty()
@@ -201,15 +215,24 @@ class LiveModel:
         """The fit's problem with these rows, those up to a time [s] only as what went before; None without any."""
         question = self.question
         try:
-            read = record(run, self.group.robot, question.outputs, False, question.tick_rad, self.differences)
+            read = record(run, self.group.robot, question.outputs, self.has_loop, question.tick_rad, self.differences)
         except (InputError, InsufficientDataError):  # no inputs, or no measurement, in these rows
             return None
         has_latency = any(p.part == LATENCY for p in self.problem.parameters)
-        begun = pieces([read], self.group.robot, question.start, has_latency, START_STD)
+        begun = (
+            loop_pieces([read], self.group.robot, question.start)
+            if self.has_loop
+            else pieces([read], self.group.robot, question.start, has_latency, START_STD)
+        )
+        self.used_until = self._before_a_gap(read)
         used = [cut for piece in begun if (cut := _after(piece, start)) is not None]
         fresh = read.outputs[read.t > start]
         self._has_signal = any(_varies(column) for column in fresh.T)
         return replace(self.problem, pieces=tuple(used)) if used else None
+
+    def _before_a_gap(self, read: Record) -> float | None:
+        """When the first piece of a log of set speeds ends; None where it is all of it, or where voltages are logged."""
+        return float(read.t[read.pieces[0][1]]) if self.has_loop and len(read.pieces) > 1 else None
 
     def _solver_of(self, problem: Problem) -> Solver[Problem]:
         return Solver(problem, self._engine.on(problem), counts_ticks=bool(self.counted.any()))
@@ -305,9 +328,8 @@ class LiveModel:
 
     def _begin(self) -> None:
         """What a stretch is judged by: all of it from before its first row."""
-        self._starts: tuple[FloatArray, ...]
         self._before, self._noise, self._trusted = self.values, self.variance, self.uncertainty
-        self._has_signal, self._starts = False, ()
+        self._has_signal, self._starts = False, self._starts if self.has_loop else ()
 
     def _scale(self, values: FloatArray) -> FloatArray:
         return np.array([p.slope(float(v)) for p, v in zip(self.problem.parameters, values, strict=True)])

@@ -47,7 +47,7 @@ class LiveStatus(Displayable):
     was predicted before it counted. enough_at [s]: when all numbers that must be were known and such a stretch was
     predicted, None before, and again once a stretch is not. misfit: what the residuals of the last whole fit follow,
     nothing where the model leaves nothing out. restarts: of the clock of the log. gap [s]: the longest between two
-    rows. waiting: why there are no numbers yet. changes: what is no longer as in the fit before.
+    rows. used_until [s]: what of it is used where a gap ends the log of a speed loop, else None. waiting: why there are no numbers yet. changes: what is no longer as in the fit before.
     """
 
     robot: str
@@ -60,6 +60,7 @@ class LiveStatus(Displayable):
     misfit: tuple[str, ...] = ()
     restarts: int = 0
     gap: float = 0.0
+    used_until: float | None = None
     waiting: str = ""
     changes: tuple[Statement, ...] = ()
 
@@ -116,6 +117,8 @@ class LiveStatus(Displayable):
             said.append(Statement("live_restarts", WARNING, numbers={"restarts": self.restarts}))
         if self.gap:
             said.append(Statement("live_gap", NOTE, numbers={"gap": self.gap}))
+        if self.used_until is not None:
+            said.append(Statement("live_used_until", WARNING, numbers={"at": self.used_until}))
         return said
 
     def document(self) -> Document:
