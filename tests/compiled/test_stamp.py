@@ -19,6 +19,7 @@ from numba.core.dispatcher import Dispatcher
 import omnidyn
 from omnidyn.compiled import stamp
 from omnidyn.compiled.entries import Entries
+from tests.support.sources import trees
 
 PACKAGE = Path(omnidyn.__file__).resolve().parent
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -81,7 +82,8 @@ def graph():
     """File -> the files that it imports."""
     found = {}
     for file in FILES:
-        names = {name for name in imports(ast.parse(file.read_bytes())) if name.split(".")[0] == "omnidyn"}
+        tree = trees()[file.relative_to(PACKAGE).as_posix()]
+        names = {name for name in imports(tree) if name.split(".")[0] == "omnidyn"}
         found[file] = set().union(*map(carried_out, names))
     return found
 
