@@ -55,10 +55,9 @@ LOOPS = [(5.0, 0.0), (5.0, 25.0), (0.0, 50.0)]  # without a sum, with both, the 
 MORE_LOOPS = [(5.0, 5.0), (5.0, 250.0), (1.0, 25.0)]  # between these
 
 
-@pytest.mark.parametrize(
-    "loop", [*LOOPS, *(pytest.param(loop, marks=pytest.mark.long) for loop in MORE_LOOPS)], ids=str
-)
+@pytest.mark.parametrize("loop", [*LOOPS, *MORE_LOOPS], ids=str)
 @pytest.mark.parametrize("sensors", ["encoder", "camera"])
+@pytest.mark.some(2)
 def test_it_beats_a_kinematic_pi_on_a_plant_of_others(loop, sensors):
     plant, along = Plant(NUMBERS["lekiwi"] | {"loop": (*loop, 1000.0)}), paths(3.0)["clover"]
     robot = told(looped(loop[1], loop[0]), sensors)

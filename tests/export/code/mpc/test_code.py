@@ -62,6 +62,7 @@ def controller_file(folder, options):
 
 
 @pytest.mark.parametrize("robot, options", VARIANTS.values(), ids=VARIANTS)
+@pytest.mark.some(4)
 def test_every_step_is_that_of_python(robot, options, tmp_path):
     follow, rng, apart = path("zigzag"), np.random.default_rng(1), []
     live = LiveRobot(robot, 0.02, pose=follow.at(0.0).pose)
@@ -89,6 +90,7 @@ def in_double(text):
 @pytest.mark.parametrize(
     "drive", [ROBOT.drive, SUMMED.replace(latency=0.0), SUMMED], ids=["volts", "loop", "late loop"]
 )
+@pytest.mark.some(2)
 def test_in_double_precision_its_formulas_are_those_of_python(sensors, drive, tmp_path):
     """What float32 hides: every number of the observer, the model and the program."""
     robot = ROBOT.replace(sensors=sensors, drive=drive)
