@@ -1,7 +1,7 @@
 """Hypothesis profiles and the robots that many tests share.
 
 OMNIDYN_HYPOTHESIS=thorough tries 50 times as many examples, and other ones in each run. Without --long, Hypothesis
-tries a third as many as with it, studies of many draws take as small a share of them (`draws`), and tests of many
+tries a third as many as with it, studies of many draws take a fifth of them (`draws`), and tests of many
 near-equal cases a few that they name (`@pytest.mark.some(5)`).
 """
 
@@ -82,10 +82,10 @@ def pytest_runtest_setup(item):
 
 @pytest.fixture(scope="session")
 def draws(pytestconfig):
-    """How many draws of a study are made: all of them with --long, else a third, under the same bounds."""
+    """How many draws of a study are made: all of them with --long, else a fifth, under the same bounds."""
 
     def number(of_study):
-        return of_study if pytestconfig.getoption("--long") else -(-of_study // 3)
+        return of_study if pytestconfig.getoption("--long") else -(-of_study // 5)
 
     return number
 

@@ -100,6 +100,7 @@ def slippery(robot):
     return robot.replace(wheels=robot.wheels.replace(traction_mu=0.6, wheel_inertia=2e-6))
 
 
+@pytest.mark.long
 def test_a_path_is_followed_where_wheels_slip_and_bristles_bend_along_it():
     """As on the twin that sticks: there the grip of the floor, and no bristle, is what is missed by."""
     bends, sticks = TRACKED["LuGre along"]

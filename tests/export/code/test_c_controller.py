@@ -112,6 +112,7 @@ def test_it_drives_the_simulated_robot_as_python_does(kind, path, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["pid", "mpc"])
+@pytest.mark.some(1)
 def test_a_loop_that_swings_says_so_in_c_as_in_python(name, tmp_path):
     follow = omnidyn.path("eight:period_s=4")
     with CController(ROBOT, tmp_path / "c", name) as control:

@@ -97,6 +97,7 @@ def test_a_number_of_one_group_is_told_with_its_group():
     )
 
 
+@pytest.mark.long
 def test_a_shape_that_all_have_is_one():
     runs, robot, _ = floors(ELLIPSE, ELLIPSE)
     found = identify(runs, robot, OutputError(free=FREE, ladder=True), groups=PER)

@@ -144,6 +144,7 @@ def test_at_every_tolerance(ellipse):
             assert max(errors) <= AGREES
 
 
+@pytest.mark.long
 def test_unequal_motors_with_dynamic_electrics(unequal):
     keys = [*BODY[::3], "motor.torque_constant_Nm_A[1]", "motor.resistance_ohm[3]", "motor.inductance_H[0]"]
     keys += ["friction.axes.viscous[0]", "friction.axes.coulomb[1]"]
@@ -191,6 +192,7 @@ def test_lossy_gears(axebot, electrical):
 
 @pytest.mark.parametrize("electrical", ["quasi-static", DYNAMIC])
 @pytest.mark.parametrize("off", ["brake", "coast"])
+@pytest.mark.some(1)
 def test_duty_of_a_supply(axebot, off, electrical):
     """voltage = duty * supply, by the chain rule; at a duty of 0 the motor brakes, or carries no current."""
     motor = axebot.motor.replace(electrical=electrical, inductance=0.004)

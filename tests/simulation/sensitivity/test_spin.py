@@ -59,6 +59,7 @@ def test_against_the_exact_engine(heavy):
     assert (found.run.twist[45:60] == 0.0).any()
 
 
+@pytest.mark.long
 def test_against_the_modes(unequal):
     """A mass that couples the axes, wheels that stop and reverse, a current limit, a turning frame."""
     keys = [f"{ROTOR}[1]", f"{WHEEL}[2]", "motor.gear_ratio", "motor.gear_ratio[0]", "wheels.wheel_radius_m[1]"]

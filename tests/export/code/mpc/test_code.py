@@ -125,6 +125,7 @@ def test_in_double_precision_its_formulas_are_those_of_python(sensors, drive, tm
 
 
 @pytest.mark.parametrize("name", ["eight", "eight:period_s=3.2"])
+@pytest.mark.some(1)
 def test_it_drives_the_simulated_robot_as_python_does(name, tmp_path):
     with CController(ROBOT, tmp_path / "c", "mpc") as control:
         in_c, own = (omnidyn.track(ROBOT, name, each, duration=4.0) for each in (control, "mpc"))
