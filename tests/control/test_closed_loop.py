@@ -80,6 +80,7 @@ def test_one_seed_is_one_noise_and_the_noise_is_as_said():
 
 
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.some(2)
 def test_any_robot_is_driven(seed):
     robot = random_robot(seed)
     robot = robot.replace(friction=robot.friction.replace(axes=robot.friction.axes.replace(breakaway=None)))

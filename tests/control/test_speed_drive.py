@@ -28,6 +28,7 @@ def looped(ki: float, kp: float = 5.0) -> Robot:
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
+@pytest.mark.some(1)
 def test_what_a_loop_sums_up_is_known_whatever_its_gain(name):
     off = [
         omnidyn.track(looped(ki), CIRCLE, name, duration=6.0).rmse_position for ki in (0.0, 1.0, 5.0, 25.0, 80.0, 250.0)
@@ -82,6 +83,7 @@ def test_many_in_one_are_one_each():
 
 
 @pytest.mark.parametrize("observer", [True, False])
+@pytest.mark.some(1)
 def test_a_wheel_that_turns_less_than_it_is_said_to_does_not_wind_up(observer):
     """Twists measured 2 % too large: the loop holds what its encoders say, for ever."""
     control = Mpc(LEKIWI, observer=observer)

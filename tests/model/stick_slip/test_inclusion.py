@@ -136,6 +136,7 @@ def faults(p, x, count):
 
 
 @pytest.mark.parametrize("part", range(4))
+@pytest.mark.some(1)
 def test_solutions_satisfy_the_law(part):
     """1000 problems: all shapes, sums, asymmetric levels, breakaway, gears, drops, limits, 3 to 6 wheels, turning."""
     per_part, wrong = ROBOTS * PROBLEMS // 4, {}
@@ -189,6 +190,7 @@ def potential(p, x):
 
 
 @pytest.mark.parametrize("seed", range(0, 40, 8))
+@pytest.mark.some(2)
 def test_the_solution_is_the_minimum_of_the_potential(seed):
     """Brute force: no point near or far, nor what Nelder-Mead finds from three starts, lies below it."""
     random = np.random.default_rng(seed)

@@ -125,6 +125,7 @@ def test_against_the_exact_engine(axebot):
     assert (twist[59, 1:] == 0.0).all(), "no stop"
 
 
+@pytest.mark.long
 def test_ellipse_wheels_and_current_limit(ellipse):
     """Reversals and stops of wheels, currents that leave their limit inside a row."""
     keys = [*BODY, MOTOR[2], "motor.current_limit_A", "friction.direction.coulomb[0]"]
@@ -231,6 +232,7 @@ def test_what_sticks_has_a_derivative_of_exactly_0(axebot):
     assert (found.twist[45][2] != 0.0).any()
 
 
+@pytest.mark.long
 def test_a_wheel_that_sticks_while_the_robot_turns(axebot):
     """Wheel 1 holds: -v_y + b omega = 0, whatever the parameter, b included."""
     friction = Friction(
