@@ -89,6 +89,7 @@ def fails(error):
 
 
 @pytest.mark.parametrize("part, end", FAILURES)
+@pytest.mark.some(2)
 def test_a_part_that_fails_costs_nothing_but_itself(call, tmp_path, monkeypatch, undisturbed, part, end):
     monkeypatch.setattr(PLACES[part], fails(ERRORS[end]))
     out, page = tmp_path / "fit.toml", tmp_path / "fit.html"

@@ -132,6 +132,7 @@ def test_without_a_writable_folder_it_compiles_in_memory(copy, tmp_path):
     assert not [path for path in tmp_path.rglob("*") if path.suffix in (".nbi", ".nbc", ".kernel")]
 
 
+@pytest.mark.long
 def test_a_numba_that_nobody_tried_gives_the_same_numbers(copy, before):
     """To the last bit; it goes its own way, and takes longer."""
     file = copy / "omnidyn" / "compiled" / "private.py"

@@ -58,7 +58,7 @@ MORE_LOOPS = [(5.0, 5.0), (5.0, 250.0), (1.0, 25.0)]  # between these
 
 @pytest.mark.parametrize("loop", [*LOOPS, *MORE_LOOPS], ids=str)
 @pytest.mark.parametrize("sensors", ["encoder", "camera"])
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 def test_it_beats_a_kinematic_pi_on_a_plant_of_others(loop, sensors):
     plant, along = Plant(NUMBERS["lekiwi"] | {"loop": (*loop, 1000.0)}), paths(3.0)["clover"]
     robot = told(looped(loop[1], loop[0]), sensors)

@@ -122,6 +122,7 @@ def test_the_robot_that_turns_on_the_spot(data):
         assert np.sqrt(np.mean(np.square(errors))) < baseline
 
 
+@pytest.mark.long
 def test_drives_with_noisy_encoders(data):
     """README: 0.5 s means are predicted within 1.55 rad/s, fitted to all; here exp4 and exp5 from exp1 to exp3."""
     runs = udea.drive_runs()

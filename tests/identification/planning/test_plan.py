@@ -28,7 +28,7 @@ def plan_of(preset):
     return omnidyn.plan(omnidyn.load_robot(preset), ROOM, noise=NOISE, free=("friction",))
 
 
-@pytest.fixture(scope="module", params=["axebot", "mecanum"])
+@pytest.fixture(scope="module", params=["axebot", pytest.param("mecanum", marks=pytest.mark.long)])
 def made(request):
     return plan_of(request.param)
 
@@ -75,7 +75,6 @@ def test_it_begins_with_ramps_that_leave_the_time_to_what_tells_more(made):
     assert made.moves[3][0] < 0.2 * made.seconds
 
 
-@pytest.mark.some(1)
 def test_the_fit_of_its_log_is_as_sure_as_it_was_told(made):
     """Of robots 30 % off: what identify says of each number beside its truth, and beside the prediction."""
     rng = np.random.default_rng(3)

@@ -113,6 +113,7 @@ def test_right_floors_take_no_step():
     assert ladder(found).end.code == "only_noise"
 
 
+@pytest.mark.long
 def test_what_is_shared_is_switched_on_in_all():
     """A frame that turns, of which the file knows nothing."""
     runs, robot, _ = floors(BOX, BOX, frame=True)

@@ -117,7 +117,7 @@ FORGETFUL = {
 
 
 @pytest.mark.parametrize("name", FORGETFUL)
-@pytest.mark.some(1)
+@pytest.mark.long
 def test_the_error_follows_the_tolerance_however_long_a_robot_remembers(name):
     """DOP853: nothing but the local share of `tol` keeps errors from adding up where motors do not damp them."""
     robot, start = FORGETFUL[name], (1.0, 0.3, 5.0)

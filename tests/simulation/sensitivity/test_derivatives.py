@@ -182,6 +182,7 @@ def test_currents_that_pass_zero_against_a_voltage_drop(unequal):
 
 
 @pytest.mark.parametrize("electrical", ["quasi-static", DYNAMIC])
+@pytest.mark.long
 def test_lossy_gears(axebot, electrical):
     """Gears that lose while they drive and lose while they are driven, and hold what rests."""
     motor = axebot.motor.replace(gear_efficiency=(0.75, 0.8, 0.7), electrical=electrical, inductance=0.004)

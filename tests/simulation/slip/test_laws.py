@@ -175,7 +175,7 @@ def meets_the_events(number, tol):
 
 
 @pytest.mark.parametrize("number", FIRST, ids=[*LAWS, *MORE, *ALONG])
-@pytest.mark.some(6)
+@pytest.mark.some(4)
 def test_each_law_against_the_events(number):
     """Within tol [m/s] and [m], 10 tol [rad/s] and [rad]; rims within 10 tol [m/s]."""
     meets_the_events(number, 1e-6)
