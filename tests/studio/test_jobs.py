@@ -47,6 +47,7 @@ def test_a_studio_compiles_the_rest_only_where_it_is_not_on_disk(monkeypatch, is
             for name in ("start", "stop"):
                 monkeypatch.setattr(worker, name, lambda: asyncio.sleep(0))
         await session.warm()
+        await session.close()
         return asked
 
     assert asyncio.run(scenario()) == [("warm", False)] + [("warm", True)] * (not is_warm)
