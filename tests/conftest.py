@@ -1,7 +1,8 @@
 """Hypothesis profiles and the robots that many tests share.
 
 OMNIDYN_HYPOTHESIS=thorough tries 50 times as many examples, and other ones in each run. Without --long, Hypothesis
-tries a third as many as with it, and studies of many draws take as small a share of them (`draws`).
+tries a third as many as with it, studies of many draws take a fifth of them (`draws`), and tests of many
+near-equal cases a few that they name (`@pytest.mark.some(5)`).
 """
 
 import gc
@@ -15,6 +16,7 @@ from hypothesis import HealthCheck, settings
 
 from omnidyn.model.robot_file import load_robot
 from tests.support.processor_times import OPTION, ProcessorTimes
+from tests.support.sampling import left_out
 
 # Workers of pytest-xdist have the processors already; set before the first test loads NumPy.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -57,16 +59,18 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Without --long the long studies are left out, and counted as deselected."""
+    """Without --long the long studies and most of many near-equal cases are left out, and counted as deselected."""
     if not config.getoption("--long"):
-        long = [item for item in items if item.get_closest_marker("long")]
-        config.hook.pytest_deselected(items=long)
-        items[:] = [item for item in items if item not in long]
+        dropped = {item for item in items if item.get_closest_marker("long")}
+        dropped |= set(left_out([item for item in items if item not in dropped]))
+        config.hook.pytest_deselected(items=[item for item in items if item in dropped])
+        items[:] = [item for item in items if item not in dropped]
 
 
 def pytest_collection_finish():
-    """What was collected stays until the end: no collection of garbage walks over it again."""
+    """What was collected stays until the end: no collection of garbage walks over it again, and fewer are begun."""
     gc.freeze()
+    gc.set_threshold(20_000)  # numba and fits make much that is no garbage: 700, the usual, takes a twentieth of all
     gc.enable()
 
 
@@ -78,10 +82,10 @@ def pytest_runtest_setup(item):
 
 @pytest.fixture(scope="session")
 def draws(pytestconfig):
-    """How many draws of a study are made: all of them with --long, else a third, under the same bounds."""
+    """How many draws of a study are made: all of them with --long, else a fifth, under the same bounds."""
 
     def number(of_study):
-        return of_study if pytestconfig.getoption("--long") else -(-of_study // 3)
+        return of_study if pytestconfig.getoption("--long") else -(-of_study // 5)
 
     return number
 

@@ -1,20 +1,17 @@
 """Words of the trade are explained where they occur, and nowhere else."""
 
 import ast
-from pathlib import Path
 
-import omnidyn
 from omnidyn.document import Document, Table
 from omnidyn.glossary import GLOSSARY, explained
-
-PACKAGE = Path(omnidyn.__file__).parent
+from tests.support.sources import trees
 
 
 def texts():
     """All text of the package that is not documentation: what results may say."""
-    for path in PACKAGE.rglob("*.py"):
-        if path.name != "glossary.py":
-            nodes = list(ast.walk(ast.parse(path.read_text("utf-8"))))
+    for name, tree in trees().items():
+        if name != "glossary.py":
+            nodes = list(ast.walk(tree))
             docs = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
             for node in nodes:
                 if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs:

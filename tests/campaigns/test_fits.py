@@ -132,6 +132,7 @@ def test_a_log_that_ends_too_early_is_not_ok_and_what_is_known_is_counted(folder
     assert main(["sweep", "merge", "out"]) == 0
 
 
+@pytest.mark.long
 def test_shapes_of_friction_are_compared_log_by_log(folder, identified):
     for k in range(2):
         write_run(plain_robot.log(k, levels=30, held=100), folder / f"held{k}.csv")

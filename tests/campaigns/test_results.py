@@ -46,6 +46,7 @@ TOTAL = {"x1": 0.5576, "x2": 0.4424, "x3": 0.2437}  # of the same
 
 
 @pytest.mark.parametrize("sampling", ["random", "latin", "sobol"])
+@pytest.mark.some(1)
 def test_total_shares_of_ishigami_lie_in_their_intervals(sampling):
     vary = {name: {"range": [-math.pi, math.pi]} for name in ("task.x1", "task.x2", "task.x3")}
     hits = 0

@@ -40,6 +40,7 @@ def in_words(text):
     return re.sub(r"[\d.]+", "N", re.sub(r" \([a-z ]+\)", "", " ".join(text.split())))
 
 
+@pytest.mark.long
 def test_every_command_says_what_stands_below_it(said):
     assert len(said) == 16
     blocks = re.findall(r"^```text\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
@@ -49,6 +50,7 @@ def test_every_command_says_what_stands_below_it(said):
         assert in_words(block.partition("\n-")[0]) in whole
 
 
+@pytest.mark.long
 def test_what_the_logs_tell_is_known_within_2_percent_and_true(said, folder):
     fit = omnidyn.load_robot(folder / "fit2.toml")
     off = {}
@@ -62,6 +64,7 @@ def test_what_the_logs_tell_is_known_within_2_percent_and_true(said, folder):
     assert "N of N numbers are known" in in_words(saying(said, "identify log-plan.csv log-next.csv"))
 
 
+@pytest.mark.long
 def test_the_unknown_robot_follows_the_path_as_it_was_promised(said):
     promised = re.search(r"([\d.]+) mm in the mean", " ".join(saying(said, "track").split()))
     driven, guessed = (float(saying(said, f"follow.py {file}").split()[0]) for file in ("fit2.toml", "guess.toml"))
@@ -70,6 +73,7 @@ def test_the_unknown_robot_follows_the_path_as_it_was_promised(said):
     assert guessed > 5.0 * driven
 
 
+@pytest.mark.long
 def test_its_pictures_are_drawn(said, folder):
     for drawn in (STUDY.draw_numbers, STUDY.draw_eight):
         assert isinstance(drawn(folder), Figure)

@@ -89,6 +89,7 @@ def fails(error):
 
 
 @pytest.mark.parametrize("part, end", FAILURES)
+@pytest.mark.some(2)
 def test_a_part_that_fails_costs_nothing_but_itself(call, tmp_path, monkeypatch, undisturbed, part, end):
     monkeypatch.setattr(PLACES[part], fails(ERRORS[end]))
     out, page = tmp_path / "fit.toml", tmp_path / "fit.html"
@@ -158,6 +159,7 @@ def test_a_robot_file_that_cannot_be_written_costs_no_result(call, tmp_path, mon
     ],
 )
 @pytest.mark.parametrize("end, shown", [("bug", ()), ("bug", ("--full",)), ("interrupt", ("--json",))])
+@pytest.mark.some(3)
 def test_so_it_is_of_steady_states_and_motors(call, tmp_path, monkeypatch, command, part, place, end, shown):
     monkeypatch.setattr(place, fails(ERRORS[end]))
     out = tmp_path / "fit.toml"

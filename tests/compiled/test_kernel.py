@@ -27,6 +27,7 @@ import omnidyn
 from omnidyn.compiled.entries import Entries
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.compiled.stamp import stamp
+from tests.support.sources import trees
 
 PACKAGE = Path(omnidyn.__file__).parent
 
@@ -131,6 +132,7 @@ def test_without_a_writable_folder_it_compiles_in_memory(copy, tmp_path):
     assert not [path for path in tmp_path.rglob("*") if path.suffix in (".nbi", ".nbc", ".kernel")]
 
 
+@pytest.mark.long
 def test_a_numba_that_nobody_tried_gives_the_same_numbers(copy, before):
     """To the last bit; it goes its own way, and takes longer."""
     file = copy / "omnidyn" / "compiled" / "private.py"
@@ -182,10 +184,9 @@ def dispatchers():
 def functions():
     """(name, syntax tree) of every function of the package."""
     found = []
-    for file in PACKAGE.rglob("*.py"):
-        module = ".".join(("omnidyn", *file.relative_to(PACKAGE).with_suffix("").parts))
-        nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
-        found += [(f"{module}.{node.name}", node) for node in nodes if isinstance(node, ast.FunctionDef)]
+    for file, tree in trees().items():
+        module = f"omnidyn/{file.removesuffix('.py')}".replace("/", ".")
+        found += [(f"{module}.{node.name}", node) for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
     return found
 
 
@@ -270,15 +271,15 @@ def test_no_part_calls_a_maker():
 def test_nobody_compiles_behind_our_back():
     """numba is imported in compiled/; others import the modules that are named here, and counts."""
     doors = "kernel|listeners|parallel|scalar_function|stamp|trace|warmed"
-    for file in PACKAGE.rglob("*.py"):
-        if file.parent == PACKAGE / "compiled":
+    for file, tree in trees().items():
+        if file.startswith("compiled/"):
             continue
         inside = re.findall(
             rf"omnidyn\.compiled\b(?!\.(?:{doors})\b|\.entries import take_stock)",
-            file.read_text(encoding="utf-8"),
+            (PACKAGE / file).read_text(encoding="utf-8"),
         )
         assert not inside, file
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             assert not [name for name in names if name.split(".")[0] == "numba"], file

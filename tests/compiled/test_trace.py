@@ -1,14 +1,12 @@
 """A traced function of plain numbers gives what the function of arrays gives."""
 
 import ast
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from omnidyn.compiled.scalar_function import scalar_function
-
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
+from tests.support.sources import trees
 
 
 def law(place, size):
@@ -35,7 +33,7 @@ def test_a_branch_on_an_input_is_not_traced():
 
 def test_no_text_becomes_code():
     """Neither eval nor exec is called anywhere in the package, nor what makes code of text."""
-    for file in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for file, tree in trees().items():
+        for node in ast.walk(tree):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
                 assert node.func.id not in ("eval", "exec", "compile", "__import__"), f"{file}:{node.lineno}"

@@ -80,6 +80,7 @@ def test_one_seed_is_one_noise_and_the_noise_is_as_said():
 
 
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.some(2)
 def test_any_robot_is_driven(seed):
     robot = random_robot(seed)
     robot = robot.replace(friction=robot.friction.replace(axes=robot.friction.axes.replace(breakaway=None)))
@@ -167,6 +168,7 @@ def restlessness(name, delay=0):
 
 @pytest.mark.parametrize("delay", [1, 2, 4])
 @pytest.mark.parametrize("name", ["pid", "speed"])
+@pytest.mark.some(2)
 def test_a_delay_that_is_known_does_not_make_it_swing(name, delay):
     assert restlessness(name, delay) < 1.5 * restlessness(name) + 0.02
 

@@ -243,6 +243,7 @@ def fuzz(name, calls, seed):
         assert control.info.status
 
 
+@pytest.mark.some(2)
 def test_random_calls(name):
     fuzz(name, 3_500, 1)
 

@@ -169,6 +169,7 @@ def steadily(name, sensors):
 
 @pytest.mark.parametrize("name", ["pid", "mpc", "speed"])
 @pytest.mark.parametrize("spec", ["jitter:2ms", "jitter:5ms", "missed:5%", "encoder,pose,jitter:5ms,missed:5%"])
+@pytest.mark.some(4)
 def test_a_loop_that_trembles_or_misses_a_step_costs_little(name, spec):
     """A goal at rest, so that a loop on the speed arrives too: at most 1.3 times as far off, or 0.1 mm more.
 

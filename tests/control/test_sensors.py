@@ -30,6 +30,7 @@ MEAN = Sensors(twist="mean")
 
 
 @pytest.mark.parametrize("make", [Pid, Mpc, lambda robot: Mpc(robot, observer=False)], ids=["pid", "mpc", "alone"])
+@pytest.mark.some(2)
 def test_encoder_differences_cost_little(make):
     instant = omnidyn.track(AXEBOT, "eight:period_s=5", make(AXEBOT), duration=6.0)
     averaged: Any = Averaged(make(AXEBOT.replace(sensors=MEAN)))

@@ -28,6 +28,7 @@ def looped(ki: float, kp: float = 5.0) -> Robot:
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
+@pytest.mark.some(1)
 def test_what_a_loop_sums_up_is_known_whatever_its_gain(name):
     off = [
         omnidyn.track(looped(ki), CIRCLE, name, duration=6.0).rmse_position for ki in (0.0, 1.0, 5.0, 25.0, 80.0, 250.0)
@@ -55,10 +56,9 @@ LOOPS = [(5.0, 0.0), (5.0, 25.0), (0.0, 50.0)]  # without a sum, with both, the 
 MORE_LOOPS = [(5.0, 5.0), (5.0, 250.0), (1.0, 25.0)]  # between these
 
 
-@pytest.mark.parametrize(
-    "loop", [*LOOPS, *(pytest.param(loop, marks=pytest.mark.long) for loop in MORE_LOOPS)], ids=str
-)
+@pytest.mark.parametrize("loop", [*LOOPS, *MORE_LOOPS], ids=str)
 @pytest.mark.parametrize("sensors", ["encoder", "camera"])
+@pytest.mark.some(1)
 def test_it_beats_a_kinematic_pi_on_a_plant_of_others(loop, sensors):
     plant, along = Plant(NUMBERS["lekiwi"] | {"loop": (*loop, 1000.0)}), paths(3.0)["clover"]
     robot = told(looped(loop[1], loop[0]), sensors)
@@ -83,6 +83,7 @@ def test_many_in_one_are_one_each():
 
 
 @pytest.mark.parametrize("observer", [True, False])
+@pytest.mark.some(1)
 def test_a_wheel_that_turns_less_than_it_is_said_to_does_not_wind_up(observer):
     """Twists measured 2 % too large: the loop holds what its encoders say, for ever."""
     control = Mpc(LEKIWI, observer=observer)

@@ -51,6 +51,7 @@ def test_outputs_that_act_later_than_told_make_a_loop_swing(make):
         (AXEBOT | {"coulomb": (1.1, 0.75, 0.05)}, "push"),
     ],
 )
+@pytest.mark.some(4)
 def test_a_push_or_a_wrong_model_is_no_swing(make, numbers, name):
     assert not swinging(make, numbers, name)[0]
 

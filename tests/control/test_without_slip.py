@@ -39,6 +39,7 @@ def test_the_mpc_that_knows_the_floor_corners_better():
 
 
 @pytest.mark.parametrize("controller", ["pid", "speed", "feedforward"])
+@pytest.mark.some(2)
 def test_the_others_drive_it_too(controller):
     floor = gripping(0.8)
     known = omnidyn.track(floor, "circle", controller, plant=floor)

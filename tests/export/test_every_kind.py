@@ -73,9 +73,10 @@ def read_back(made, folder):
 
 @pytest.mark.parametrize(
     "robot",
-    [*ROBOTS, *(pytest.param(robot, marks=pytest.mark.long) for robot in MORE_ROBOTS)],
+    [*ROBOTS, *MORE_ROBOTS],
     ids=lambda robot: robot.name.replace(" ", "-"),
 )
+@pytest.mark.some(8)
 def test_written_or_refused_as_the_table_says(robot, tmp_path):
     for kind in KINDS:
         has = [name for name, feature in FEATURES.items() if feature.has(robot)]
@@ -112,6 +113,7 @@ def test_written_or_refused_as_the_table_says(robot, tmp_path):
         {"friction": {"axes": {"viscous": (0.0, 0.0, 0.0), "coulomb": (1e-300, 5e-324, 0.1)}}},
     ],
 )
+@pytest.mark.some(30)
 def test_huge_and_tiny_numbers_are_written_or_refused_in_words(kind, change, tmp_path):
     plain = omnidyn.load_robot("axebot")
     ((part, values),) = change.items()

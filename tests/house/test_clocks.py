@@ -8,9 +8,9 @@ import ast
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
+from tests.support.sources import PACKAGE, trees
+
 ROOMS = ("logs", "findings", "comparison", "identification")
 MERGED = ("run", "log", "record", "self", "piece")  # what a `.t` of all clocks belongs to
 
@@ -70,9 +70,8 @@ def _name(node: ast.Call) -> str:
 @cache
 def files() -> list[tuple[str, ast.AST]]:
     """(name, tree) of the files that take steps at all."""
-    paths = [PACKAGE / "run.py", *(path for room in ROOMS for path in (PACKAGE / room).rglob("*.py"))]
-    texts = [(path.relative_to(PACKAGE).as_posix(), path.read_text("utf-8")) for path in sorted(paths)]
-    return [(name, ast.parse(text)) for name, text in texts if "diff(" in text]
+    read = [name for name in trees() if name == "run.py" or name.partition("/")[0] in ROOMS]
+    return [(name, trees()[name]) for name in read if "diff(" in (PACKAGE / name).read_text("utf-8")]
 
 
 def test_the_usual_step_comes_from_the_clock_of_a_channel():

@@ -1,9 +1,8 @@
 """An engine of fits is asked for what it is, never for its name: only its own file says that. These may get fewer."""
 
 import ast
-from pathlib import Path
 
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
+from tests.support.sources import trees
 
 # What names an engine of another file, and why. What does so no more must go from this list.
 KEPT = {
@@ -17,14 +16,12 @@ def bases(node):
     return {name.id for base in node.bases for name in ast.walk(base) if isinstance(name, ast.Name)}
 
 
-def named_outside(package):
+def named_outside(parsed):
     """File -> the engines of fits of other files that it names, by import."""
-    trees = {
-        path.relative_to(package / "identification").as_posix(): ast.parse(path.read_text("utf-8"))
-        for path in sorted((package / "identification").rglob("*.py"))
-    }
+    room = "identification/"
+    parsed = {name.removeprefix(room): tree for name, tree in parsed.items() if name.startswith(room)}
     classes = [
-        (file, node) for file, tree in trees.items() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)
+        (file, node) for file, tree in parsed.items() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)
     ]
     engines = {"FitEngine"}
     for _ in classes:  # an engine of an engine of an engine
@@ -33,7 +30,7 @@ def named_outside(package):
             break
         engines |= more
     found = {}
-    for file, tree in trees.items():
+    for file, tree in parsed.items():
         imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names}
         if names := imported & (engines - {"FitEngine"}):
             found[file] = sorted(names)
@@ -41,4 +38,4 @@ def named_outside(package):
 
 
 def test_no_further_file_names_an_engine():
-    assert set(named_outside(PACKAGE)) == set(KEPT)
+    assert set(named_outside(trees())) == set(KEPT)

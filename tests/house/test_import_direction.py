@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
+from tests.support.sources import PACKAGE, trees
 
 # From what knows nothing to what knows all. A name is a file or a folder, and may be listed before it exists.
 FLOORS = (
@@ -94,9 +94,9 @@ def imported(module: str, tree: ast.AST) -> Iterator[tuple[int, str]]:
 def imports(package: Path) -> list[Import]:
     """Every import of one file of the package by another."""
     found: set[Import] = set()
-    for path in sorted(package.rglob("*.py")):
-        module = path.relative_to(package).with_suffix("").as_posix()
-        for line, name in imported(module, ast.parse(path.read_text("utf-8"), str(path))):
+    for file, parsed in trees(package).items():
+        module = file.removesuffix(".py")
+        for line, name in imported(module, parsed):
             if name.split(".")[0] == "omnidyn":
                 found.add((module, line, resolve(package, name)))
     return sorted(found)

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.sources import trees
+
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGE = ROOT / "src" / "omnidyn"
 PAGES = ("RELIABILITY.md", "SECURITY.md")
 ROW = re.compile(r"^\| (?P<promise>[^|]+) \| `(?P<file>tests/[\w/]+\.py)::(?P<test>\w+)` \|$", re.MULTILINE)
 
@@ -78,8 +79,7 @@ def called(tree):
 @cache
 def findings():
     """Of every file of the package what could run a file of the user's, and what it imports. Each is read once."""
-    trees = {path.relative_to(PACKAGE).as_posix(): ast.parse(path.read_text("utf-8")) for path in PACKAGE.rglob("*.py")}
-    return {name: (risks(tree), set(imported(tree))) for name, tree in trees.items()}
+    return {name: (risks(tree), set(imported(tree))) for name, tree in trees().items()}
 
 
 def risks(tree):

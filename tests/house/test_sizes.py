@@ -6,9 +6,9 @@ Statements, not lines: the formatter lays out lines, and an argument list of one
 import ast
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
+from tests.support.sources import trees
+
 FILE, FUNCTION = 300, 55  # statements of the syntax tree
 PARAMETERS = 8  # of a function; more ask for a value type
 LONG_LISTS = 86  # functions that have more: it may fall, never rise; write a smaller number when it fell
@@ -55,8 +55,7 @@ def found() -> tuple[dict[str, int], list[str], int]:
     long: dict[str, int] = {}
     private: list[str] = []
     lists = 0
-    for path in sorted(PACKAGE.rglob("*.py")):
-        name, tree = path.relative_to(PACKAGE).as_posix(), ast.parse(path.read_text("utf-8"))
+    for name, tree in trees().items():
         long.update(long_ones(name, tree))
         private += private_ones(name, tree)
         lists += long_lists(tree)

@@ -6,9 +6,9 @@ Each count is written here: it may fall, never rise.
 import ast
 import re
 from collections import Counter
-from pathlib import Path
 
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
+from tests.support.sources import PACKAGE, trees
+
 FORBIDDEN = ("way", "known", "told")  # as names of variables, arguments, attributes, functions
 
 
@@ -46,15 +46,14 @@ def glued(text, tree):
     ]
 
 
-def names_of_classes_twice(trees):
+def names_of_classes_twice(files):
     """Names that classes of several files have."""
-    found = Counter(name for tree in trees for name in {n.name for n in tree.body if isinstance(n, ast.ClassDef)})
+    found = Counter(name for tree in files for name in {n.name for n in tree.body if isinstance(n, ast.ClassDef)})
     return sorted(name for name, count in found.items() if count > 1)
 
 
 def test_words_get_no_worse():
-    texts = [path.read_text("utf-8") for path in PACKAGE.rglob("*.py")]
-    trees = [ast.parse(text) for text in texts]
-    counts = (sum(map(forbidden, trees)), sum(map(len, map(glued, texts, trees))))
+    texts = [(PACKAGE / name).read_text("utf-8") for name in trees()]
+    counts = (sum(map(forbidden, trees().values())), sum(map(len, map(glued, texts, trees().values()))))
     assert counts == (FORBIDDEN_NAMES, GLUED), "it rose: choose another name, make it a module; it fell: write it down"
-    assert not names_of_classes_twice(trees)
+    assert not names_of_classes_twice(trees().values())

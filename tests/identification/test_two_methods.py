@@ -32,6 +32,7 @@ def both(seed, world):
 
 
 @pytest.mark.parametrize("seed", range(2))
+@pytest.mark.some(1)
 def test_a_right_model_is_the_same_by_both(seed):
     whole, steady = both(seed, World())
     truth = dict(zip(KEYS, (*World().viscous[:2], *World().coulomb[:2]), strict=True))

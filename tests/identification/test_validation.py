@@ -190,6 +190,7 @@ def counted(robot, seed, seconds=12.0, tick=2.0 * np.pi / 2048):
 
 
 @pytest.mark.parametrize("name", ["wheel_angle", "pose"])
+@pytest.mark.some(1)
 def test_counts_and_positions_are_held_out_too(name):
     """On a robot as `init` makes it. What a start is off by, and the tick of an encoder, are no errors of the model."""
     robot = AXEBOT.replace(body=AXEBOT.body.replace(rotating_frame=True))

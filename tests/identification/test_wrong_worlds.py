@@ -84,6 +84,7 @@ def test_one_axis_against_its_closed_form():
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+@pytest.mark.some(14)
 def test_a_wrong_world_of_size_0_is_right_and_a_large_one_is_not(short, monkeypatch, kind):
     monkeypatch.setattr("benchmarks.wrong_worlds.kinds.WHEN", 2.0)
     none, large = (kind.make(plain(SEED), size) for size in (0.0, 0.9 * kind.most))

@@ -210,6 +210,7 @@ def camera_log(path, seed, glitches=False):
 
 @pytest.mark.parametrize("glitches", [False, True])
 @pytest.mark.parametrize("seed", range(10))
+@pytest.mark.some(7)
 def test_counts_at_the_motor_and_cameras_show_radius_and_arm(tmp_path, seed, glitches):
     back = camera_log(tmp_path / "log.csv", seed, glitches)
     options = LogOptions(assume={"a": f"ticks/{COUNTS}@motor"}, gear_ratio=GEAR)

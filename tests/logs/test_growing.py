@@ -114,6 +114,7 @@ def test_what_is_no_table_is_refused(table):
     ],
     ids=["two bytes", "set to zero"],
 )
+@pytest.mark.some(2)
 def test_counters_go_on_from_block_to_block(axebot, reading, resets, slack, rows):
     """Wheels at 40 rad/s and more: the angle that was turned, however few rows come at once."""
     count = np.floor(np.outer(np.arange(400) ** 1.05, [200.0, 260.0, -230.0])).astype(int)

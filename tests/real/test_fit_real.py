@@ -75,12 +75,13 @@ def test_the_readmes_regression_comes_out_of_our_windows(data):
     assert np.sqrt(np.mean((u - columns @ numbers) ** 2)) == pytest.approx(0.93, abs=0.06)
 
 
-def test_no_friction_is_written(bench):
+@pytest.mark.parametrize("k", [0, 1])
+@pytest.mark.some(1)
+def test_no_friction_is_written(bench, k):
     """No dead band and no offset, of either run of a kind, for held-out blocks do not need them."""
-    for k in (0, 1):
-        (motor,) = identify([runs[k] for runs in bench.values()], None, MotorFit()).study.motors
-        assert "dead_band" in motor.rejected
-        assert not {"dead_band", "offset"} & set(motor.value)
+    (motor,) = identify([runs[k] for runs in bench.values()], None, MotorFit()).study.motors
+    assert "dead_band" in motor.rejected
+    assert not {"dead_band", "offset"} & set(motor.value)
 
 
 def test_what_is_written_of_the_first_runs_predicts_the_second_as_in_the_readme(bench):
@@ -121,6 +122,7 @@ def test_the_robot_that_turns_on_the_spot(data):
         assert np.sqrt(np.mean(np.square(errors))) < baseline
 
 
+@pytest.mark.long
 def test_drives_with_noisy_encoders(data):
     """README: 0.5 s means are predicted within 1.55 rad/s, fitted to all; here exp4 and exp5 from exp1 to exp3."""
     runs = udea.drive_runs()

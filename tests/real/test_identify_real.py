@@ -58,6 +58,7 @@ def points(runs):
 
 
 @pytest.mark.parametrize("group", [*TRAVEL])
+@pytest.mark.some(2)
 def test_force_along_travel_as_in_the_readme(points, group):
     along, (mean, error, deviation) = points[group].along, TRAVEL[group]
     assert len(along) == (36 if group == "green 0.1" else 72)

@@ -17,6 +17,7 @@ def turning(data):
     return Run(t=cut.t, duty=cut.duty, pose=cut.pose, source="half")
 
 
+@pytest.mark.long
 def test_the_answer_does_without_a_dead_band_and_a_gain(turning):
     robot = real_nuisances.udea_robot()
     fit = identify(turning, robot, OutputError()).estimate

@@ -243,6 +243,7 @@ def test_accelerations_from_rest_minimise_the_convex_function(seed):
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 4, 9, 10, 11, 13])
+@pytest.mark.some(3)
 def test_energy_is_accounted_for(seed):
     robot = random_robot(seed)
     voltage, dt = random_voltages(robot, seed)

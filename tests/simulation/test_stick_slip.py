@@ -61,6 +61,7 @@ def cycle(falls):
 
 
 @pytest.mark.parametrize("name", LAWS)
+@pytest.mark.some(1)
 def test_a_mass_on_a_spring_sticks_and_slips_as_often_as_its_series_does(name):
     """Each of five cycles, between two rows at which the simulated body is about to break loose. 5e-10 s measured."""
     with mpmath.workdps(DIGITS):

@@ -20,6 +20,15 @@ if folder := os.environ.get("OMNIDYN_PLAYWRIGHT"):
     sys.path.append(folder)
 
 PATIENCE = 200  # [s] that a server has to begin, and to end
+# As `python -m omnidyn`, but for the kernels that a studio compiles while nobody waits: each server of the tests would
+# begin that anew, and be ended before it is done.
+WITHOUT_WARMING = """
+import asyncio, sys
+from omnidyn.cli import main
+from omnidyn.studio.session import Session
+Session.warm = lambda self: asyncio.sleep(0)
+sys.exit(main())
+"""
 
 
 @dataclass(frozen=True)
@@ -34,7 +43,7 @@ class Studio:
 @contextlib.contextmanager
 def running(*arguments: str) -> Iterator[Studio]:
     """A studio on a free port."""
-    words = [sys.executable, "-m", "omnidyn", "studio", "--no-browser", "--port", "0", *arguments]
+    words = [sys.executable, "-c", WITHOUT_WARMING, "studio", "--no-browser", "--port", "0", *arguments]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
         late = threading.Timer(PATIENCE, process.kill)  # it never says its address
         late.start()

@@ -186,6 +186,7 @@ def test_a_bad_workspace_is_told_and_refused(start, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["", "track"])
+@pytest.mark.some(1)
 def test_uploads_are_bounded_in_number(start, kind):
     from omnidyn.studio.session import MAX_FILES
 

@@ -166,6 +166,7 @@ async def held_until(planned, page, reached):
             await asyncio.sleep(0.02)
 
 
+@pytest.mark.long
 def test_a_plan_is_driven_from_a_page_and_its_logs_can_be_fitted(tmp_path):
     async def scenario():
         studio = Studio()

@@ -121,6 +121,7 @@ LONG = {"one quiet step", "four steps", "bent", "noisy", "sticky ramp"}  # their
 
 
 @pytest.mark.parametrize("name", MOTORS)
+@pytest.mark.some(4)
 def test_of_motors(name):
     agree(of_result(identify([MOTORS[name]()], None, MotorLine())))
 
@@ -143,12 +144,14 @@ def axebot_fit(seed, **changes):
     [lambda: axebot_fit(1), lambda: axebot_fit(2, mass=2.1), lambda: axebot_fit(3, rotating_frame=True)],
     ids=["right", "heavy", "frame"],
 )
+@pytest.mark.some(2)
 def test_of_whole_logs(fit):
     agree(of_result(fit()))
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.25])
 @pytest.mark.parametrize("told", [BOX, ELLIPSE])
+@pytest.mark.some(2)
 def test_of_constant_speeds(told, factor):
     """A box of friction, told as it is and as an ellipse, on one floor and on two."""
     world = World(shape=BOX, **ROUND)

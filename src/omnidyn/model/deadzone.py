@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -17,11 +19,13 @@ from omnidyn.model.dynamics import (
     drive_wrench,
     holds_under,
     linear_part,
+    wrench_of_motors,
 )
 from omnidyn.model.mass import per_mass
+from omnidyn.model.motor import Motor
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope
-from omnidyn.model.wheels import refuse_slip
+from omnidyn.model.wheels import Wheels, refuse_slip
 
 HIGHEST = 1e6  # [V] beyond which a pattern counts as one that never moves the robot
 BISECTIONS = 60
@@ -120,10 +124,16 @@ def dead_zone_force(robot: Robot, directions: ArrayLike) -> FloatArray:
 
 
 def _voltage_per_wrench(robot: Robot) -> FloatArray:
-    """Voltages of least norm for a unit wrench at standstill, before any loss. Shape (wheels, 3)."""
-    return np.asarray(
-        np.linalg.pinv(drive_wrench(linear_part(robot), np.zeros(3), np.eye(robot.wheels.count)).T), dtype=float
-    )
+    """Voltages of least norm for a unit wrench at standstill, before any loss. Shape (wheels, 3), read-only."""
+    return _of_motors(linear_part(robot).motor, robot.wheels)  # pyright: ignore[reportArgumentType]
+
+
+@lru_cache(maxsize=64)
+def _of_motors(motor: Motor, wheels: Wheels) -> FloatArray:
+    """Asked for by each move of a plan, of the same motors."""
+    volts = np.asarray(np.linalg.pinv(wrench_of_motors(motor, wheels, np.zeros(3), np.eye(wheels.count)).T), float)
+    volts.flags.writeable = False
+    return volts
 
 
 def _scaled(patterns: FloatArray) -> FloatArray:

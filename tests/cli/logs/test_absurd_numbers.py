@@ -110,6 +110,7 @@ def check(command, capsys):
 
 
 @pytest.mark.parametrize("log, channel, kind", SHORT)
+@pytest.mark.some(2)
 def test_no_absurd_column_ends_in_a_traceback(tmp_path, monkeypatch, capsys, log, channel, kind):
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "log.csv", log, channel, kind)

@@ -52,6 +52,7 @@ def settled(robot, volts):
 
 
 @pytest.mark.parametrize("name", SLIDING)
+@pytest.mark.some(3)
 def test_what_is_predicted_is_the_law_as_a_simulation_slides_on_it(name):
     """Force and slope by two steady motions of `simulate`, a bristle bent as far as it goes, near each other."""
     robot = SLIDING[name]
@@ -83,6 +84,7 @@ def error_of_twin(twin, controller):
 
 @pytest.mark.parametrize("controller", ["mpc", "feedforward"])
 @pytest.mark.parametrize("name", TRACKED)
+@pytest.mark.some(3)
 def test_a_path_is_followed_as_on_the_twin_that_sticks(name, controller):
     """Within what a bristle bends when it is turned round, 2 C/sigma0 = 0.44 mm; in Karnopp's band, a hundredth.
 
@@ -98,6 +100,7 @@ def slippery(robot):
     return robot.replace(wheels=robot.wheels.replace(traction_mu=0.6, wheel_inertia=2e-6))
 
 
+@pytest.mark.long
 def test_a_path_is_followed_where_wheels_slip_and_bristles_bend_along_it():
     """As on the twin that sticks: there the grip of the floor, and no bristle, is what is missed by."""
     bends, sticks = TRACKED["LuGre along"]

@@ -17,6 +17,7 @@ def by_scipy(program, hessian, slope):
 
 @pytest.mark.parametrize("robot", ["axebot", "four-wheel", "mecanum"])
 @pytest.mark.parametrize("scale", [0.2, 1.0, 5.0])
+@pytest.mark.some(4)
 def test_it_is_the_optimum_of_scipy(robot, scale):
     rng = np.random.default_rng(8)
     for _ in range(5):

@@ -86,6 +86,7 @@ def steps(seed, count):
 
 @pytest.mark.parametrize("name", WRITTEN)
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: f"{robot.name} {robot.drive.kind}".replace(" ", "-"))
+@pytest.mark.some(11)
 def test_it_is_the_controller_of_python(name, robot, tmp_path):
     t, apart = 0.0, []
     with CController(robot, tmp_path / "c", name) as control:
@@ -101,6 +102,7 @@ def test_it_is_the_controller_of_python(name, robot, tmp_path):
 
 @pytest.mark.parametrize("kind", ["voltage", "duty", "speed"])
 @pytest.mark.parametrize("path", ["eight", "square"])
+@pytest.mark.some(3)
 def test_it_drives_the_simulated_robot_as_python_does(kind, path, tmp_path):
     robot = driven(kind) if kind != "voltage" else ROBOT
     with CController(robot, tmp_path / "c") as control:
@@ -110,6 +112,7 @@ def test_it_drives_the_simulated_robot_as_python_does(kind, path, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["pid", "mpc"])
+@pytest.mark.some(1)
 def test_a_loop_that_swings_says_so_in_c_as_in_python(name, tmp_path):
     follow = omnidyn.path("eight:period_s=4")
     with CController(ROBOT, tmp_path / "c", name) as control:
@@ -128,6 +131,7 @@ def test_a_loop_that_swings_says_so_in_c_as_in_python(name, tmp_path):
 
 
 @pytest.mark.parametrize("kind, most", [("voltage", 2.5e-3), ("duty", 5e-3), ("speed", 0.018)])
+@pytest.mark.some(2)
 def test_a_robot_that_was_held_overshoots_little(kind, most, tmp_path):
     robot, follow = ROBOT if kind == "voltage" else driven(kind), omnidyn.path("circle:radius_m=0.5,speed_m_s=0.1")
     with CController(robot, tmp_path / "c") as control:
@@ -248,6 +252,7 @@ def test_a_latency_that_is_no_whole_number_of_steps_is_refused_for_the_predictiv
 
 @pytest.mark.parametrize("name", ["pid", "mpc"])
 @pytest.mark.parametrize("twist", ["mean", "instantaneous", "of the log"])
+@pytest.mark.some(2)
 def test_a_late_pose_is_brought_up_to_now_as_in_python(name, twist, tmp_path):
     """A camera of 30 Hz and 50 ms in a loop that trembles, with a sample that is missing."""
     robot = (

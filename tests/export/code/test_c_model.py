@@ -19,6 +19,7 @@ ROBOT = omnidyn.load_robot("axebot")
 
 
 @pytest.mark.parametrize("seed", range(12))
+@pytest.mark.some(5)
 def test_it_is_the_engine(seed, tmp_path):
     robot = exact_robot(seed)
     volts = program(robot, seed)
@@ -108,6 +109,7 @@ def test_robots_of_init_are_the_engine_at_its_tolerance(seed, tmp_path):
     ],
     ids=["limits, losses and windings", "stribeck", "bristles", "karnopp"],
 )
+@pytest.mark.some(2)
 def test_fixed_steps_are_the_engine_whatever_the_law(robot, tmp_path):
     volts = program(robot, 1, 200)
     run = omnidyn.simulate(robot, volts, 2e-3, tol=None)

@@ -155,6 +155,7 @@ def java_program(tmp_path_factory):
 
 
 @pytest.mark.parametrize("end", ENDS)
+@pytest.mark.some(3)
 def test_java(java_program, end):
     check(end, *answers(["java", "-cp", java_program, "Main"], end))
 

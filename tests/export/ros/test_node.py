@@ -73,6 +73,7 @@ def driven(module, robot, goal, seconds, told=True):
     "goal", [(0.4, 0.0, 0.0), (0.0, -0.3, 0.0), (0.0, 0.0, 2.0), (0.3, 0.2, 1.0), (0.05, 0.0, 0.0)]
 )
 @pytest.mark.parametrize("told", [True, False])
+@pytest.mark.some(8)
 def test_it_reaches_the_twist_that_is_asked_for(drive, robot, goal, told):
     told = told or robot.friction.axes.breakaway is not None  # from rest it must know that it rests
     plant = driven(drive(robot), robot, goal, 1.5, told)

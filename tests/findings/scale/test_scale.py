@@ -145,6 +145,7 @@ def exact_log(robot, voltage, rate=100.0):
 
 @pytest.mark.parametrize("turning", [40, 100, 200])
 @pytest.mark.parametrize("without", [(), ("twist",), ("current",), ("twist", "current")])
+@pytest.mark.some(4)
 def test_a_short_turn_of_our_own_exact_log_is_no_outlier(robot, with_channels, grave, turning, without):
     straight = [(0.0, level, -level) for level in (3, -3, 4, -4, 5, -5) for _ in range(200)]
     rows = [*straight, *[(0.0, 0.0, 0.0)] * 100, *[(5.5, 5.5, 5.5)] * turning]

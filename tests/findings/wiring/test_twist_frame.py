@@ -41,6 +41,7 @@ def test_a_twist_in_the_frame_of_the_room(robot, others):
 
 @pytest.mark.parametrize("degrees", [8.0, -12.0, 40.0, 90.0, -150.0])
 @pytest.mark.parametrize("others", [WHEELS, NO_WHEELS, {"twist": None, "wheel_speed": None}])
+@pytest.mark.some(5)
 def test_a_marker_that_is_mounted_at_an_angle(degrees, others):
     log = recorded(pose=lambda pose: pose + np.array([0.0, 0.0, np.radians(degrees)]), **others)
     for robot in (ROBOT, None) if "wheel_speed" in others else (ROBOT,):

@@ -42,6 +42,7 @@ def test_a_wiring_puts_right_what_it_describes():
 
 @pytest.mark.parametrize("order, sign", SOME)
 @pytest.mark.parametrize("channel, letter", [("wheel_speed", "w"), ("voltage", "u"), ("current", "i")])
+@pytest.mark.some(7)
 def test_columns_in_the_wrong_place_are_named(log, robot, with_channels, grave, order, sign, channel, letter):
     broken = with_channels(**{channel: log.channels[channel][:, order] * sign})
     verdict = check(broken, robot)

@@ -139,6 +139,7 @@ def test_numbers_that_do_not_predict_are_not_enough(exact):
     assert "not yet" in str(status.verdict)
 
 
+@pytest.mark.long
 def test_a_model_that_leaves_something_out_is_said_and_never_enough():
     """Friction along the direction of travel, as one disc, by Euler steps of 0.5 ms; the model has it along each axis.
     All intervals are narrow, stretches are predicted within autocorrelated errors, and Coulomb friction is 70 % off."""

@@ -104,7 +104,8 @@ def test_a_true_way_is_as_sure_as_before(clean):
     assert fit.dead_band_seen
 
 
-@pytest.mark.parametrize("band", [pytest.param(BAND, marks=pytest.mark.long), 0.0])
+@pytest.mark.long
+@pytest.mark.parametrize("band", [BAND, 0.0])
 def test_the_way_chosen_by_logs_left_out_is_the_true_one(clean, band):
     """Held inputs, no latency; a dead band only where there is one. One log is predicted by its parts."""
     for runs in (run_of(clean, band, 2), [run_of(clean, band, seed) for seed in range(2)]):

@@ -126,6 +126,7 @@ def test_an_offset_becomes_friction_unequal_by_direction_in_the_robot_file(offse
 
 
 @pytest.mark.parametrize("names, unit", [("t_s,f1_N,x_m", "N"), ("t_s,u1_V,vx_m_s", "V")])
+@pytest.mark.some(1)
 def test_an_axis_in_metres_is_a_motor(tmp_path, names, unit):
     """Force or voltage in, position or speed out."""
     put_in = stairs(6)

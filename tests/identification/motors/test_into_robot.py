@@ -61,6 +61,7 @@ def tied():
 
 
 @pytest.mark.parametrize("method", [MotorLine(), MotorFit(between="hold", nuisances="none")])
+@pytest.mark.some(1)
 def test_the_numbers_come_back(method):
     """Within four standard errors, and what steps of 0.5 ms are off by."""
     numbers = motors_into_robot(identify([log()], None, method).study, tied())
@@ -80,6 +81,7 @@ HEAVY = 4e-3  # at the wheel [kg m^2]: a lag of 37 ms
 
 
 @pytest.mark.parametrize("method", [MotorLine(), MotorFit(between="hold", nuisances="none")])
+@pytest.mark.some(1)
 def test_a_rotor_comes_back(method):
     """Within four standard errors, and what steps of 0.5 ms are off by."""
     numbers = motors_into_robot(identify([log(inertia=HEAVY)], None, method).study, tied())

@@ -41,6 +41,7 @@ def test_a_bend_of_the_line_moves_no_start():
 
 
 @pytest.mark.parametrize("how", [{}, {"noise": 0.5}, {"ticks": 400}, {"ticks": 2000}], ids=str)
+@pytest.mark.some(2)
 def test_the_intervals_hold_the_truth(how, draws):
     """Two draws of each; bench studies has many."""
     found = coverage([STICKY, EQUAL], draws(2), ALL, **how)

@@ -87,6 +87,7 @@ OF_TABLE = ("breakaway", "stribeck_speed", "stiffness", "damping")
     ],
     ids=["lugre", "critical", "dahl", "direction", "wheels"],
 )
+@pytest.mark.some(2)
 def test_derivatives_are_differences_of_the_differential_equation(robot, keys):
     """How far things are bent goes along: within what `derivatives` promises."""
     levels = np.random.default_rng(0).uniform(-3.0, 3.0, (6, 3)) * [[1.0], [0.3], [1.0], [0.5], [1.0], [0.2]]

@@ -69,6 +69,7 @@ def log(friction):
 
 
 @pytest.mark.parametrize("friction", [DISC, BOX], ids=["disc", "box"])
+@pytest.mark.some(1)
 def test_the_friction_comes_out_right_with_the_rotor_in_the_file(friction):
     """As one fits a robot of which only the mass is known; both models follow the log equally well.
 

@@ -41,6 +41,7 @@ def log_with_gyroscope(wheels: str, own_clock: bool = False) -> omnidyn.Run:
 
 
 @pytest.mark.parametrize(("wheels", "own_clock"), [("counts", False), ("counts", True), ("speeds", False)])
+@pytest.mark.some(2)
 def test_noise_and_bias_of_a_gyroscope_stand_in_the_table_of_the_log(wheels, own_clock):
     fitted = omnidyn.identify(log_with_gyroscope(wheels, own_clock=own_clock), AXEBOT, quick=True).robot
     assert fitted.log is not None

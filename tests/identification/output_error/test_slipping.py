@@ -72,6 +72,7 @@ def test_a_right_model_of_wheels_that_slip_is_found_right(fit):
     assert abs(viscous["wheels.inertia_kg_m2"]) < 0.1  # [percent per percent]: light wheels
 
 
+@pytest.mark.long
 def test_a_wrong_mass_is_found_though_wheels_slip():
     heavy = ROBOT.replace(body=ROBOT.body.replace(mass=1.4 * ROBOT.body.mass))
     wrong = identify(

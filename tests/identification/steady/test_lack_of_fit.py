@@ -10,6 +10,7 @@ from tests.support.shapes_offered import NOT_OFFERED, OFFERED, study
 
 
 @pytest.mark.parametrize("world", [*NOT_OFFERED])
+@pytest.mark.some(2)
 def test_a_shape_that_is_not_offered_is_noticed_and_named(world):
     found = study(world, 0)
     lack = found.lack_of_fit["all"]
@@ -22,6 +23,7 @@ def test_a_shape_that_is_not_offered_is_noticed_and_named(world):
 
 
 @pytest.mark.parametrize("world", [*OFFERED])
+@pytest.mark.some(2)
 def test_nothing_is_invented_where_a_shape_fits(world):
     found = study(world, 0)
     assert not found.lack_of_fit["all"].found

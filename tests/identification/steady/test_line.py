@@ -116,6 +116,7 @@ def noisy_speed(random):
         (known_std, True),
     ],
 )
+@pytest.mark.some(2)
 def test_the_intervals_cover_as_often_as_they_say(make, absolute):
     assert coverage(make, absolute) == NEAR
 

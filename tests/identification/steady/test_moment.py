@@ -82,6 +82,7 @@ def test_the_run_that_changed_is_named():
 
 
 @pytest.mark.parametrize(("shape", "count", "factor"), [(BOX, 12, 1.1), (ELLIPSE, 16, 0.95), (WHEELS, 12, 1.05)])
+@pytest.mark.some(1)
 def test_a_change_is_found_by_the_shape_where_no_command_comes_again(shape, count, factor):
     world, changed = World(shape=shape, **ROUND), 0.55 * count * HOLD
     study = identify([once(5, world, count, change=changed, factor=factor)], robot_of(world), SteadyState()).study
@@ -97,6 +98,7 @@ def test_a_change_is_found_by_the_shape_where_no_command_comes_again(shape, coun
 
 
 @pytest.mark.parametrize("shape", [BOX, ELLIPSE, WHEELS])
+@pytest.mark.some(2)
 def test_a_right_shape_does_not_change(shape):
     world = World(shape=shape, **ROUND)
     assert not identify([once(6, world, 14)], robot_of(world), SteadyState()).study.moments
@@ -110,6 +112,7 @@ def test_a_wrong_shape_that_is_driven_round_is_no_change():
 
 
 @pytest.mark.parametrize("shape", [BOX, ELLIPSE, WHEELS])
+@pytest.mark.some(1)
 def test_a_change_is_told_first_and_the_shape_fits_on_both_sides_of_it(shape):
     """One round: left is driven before it, right after, which looks like another level to the left."""
     world, changed = World(shape=shape, **ROUND), 0.55 * 20 * HOLD

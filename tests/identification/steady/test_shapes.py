@@ -50,6 +50,7 @@ def test_a_shape_is_what_the_model_s_friction_asks_for(shape):
 
 
 @pytest.mark.parametrize("name", [name for name, shape in SHAPES.items() if shape.in_model])
+@pytest.mark.some(8)
 def test_every_shape_of_a_robot_file_is_what_its_robot_feels(name):
     """Levels into a robot file and back through the model: sums and viscous parts included."""
     robot, shape, twists = load_robot("axebot"), SHAPES[name], some_twists()

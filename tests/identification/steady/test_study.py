@@ -34,6 +34,7 @@ def noisy(shape, seed=0, **how):
 
 
 @pytest.mark.parametrize("shape", [*FRICTIONS])
+@pytest.mark.some(2)
 def test_clean_logs_give_the_truth(shape):
     study = identify(clean(shape), AXEBOT, SteadyState(shape=shape)).study
     for key, value in TRUTH[shape].items():
@@ -48,6 +49,7 @@ def test_both_origins_of_the_force_agree_on_a_clean_log(force_from):
 
 
 @pytest.mark.parametrize("shape", [*FRICTIONS])
+@pytest.mark.some(2)
 def test_the_true_shape_is_chosen_and_its_intervals_hold_the_truth(shape):
     """Three draws of each; the benchmark does hundreds. No box is taken for a disc, and no disc for a box."""
     held = []

@@ -11,6 +11,7 @@ SOME = [ALIKE[0], ALIKE[7], ALIKE[12], ALIKE[18]]
 
 
 @pytest.mark.parametrize("case", SOME, ids=[case.name for case in SOME])
+@pytest.mark.some(2)
 def test_equal_causes_are_one_group(case):
     good, words = grouped(case, 41)
     assert good, words

@@ -67,6 +67,7 @@ def test_a_right_world_takes_no_step():
         ("fade", 0.05, "fade"),
     ],
 )
+@pytest.mark.some(1)
 def test_what_is_missing_is_switched_on_and_then_nothing_is(name, size, key):
     assert_switched_on(*climbed(name, size), key)
 

@@ -97,6 +97,7 @@ def test_a_number_of_one_group_is_told_with_its_group():
     )
 
 
+@pytest.mark.long
 def test_a_shape_that_all_have_is_one():
     runs, robot, _ = floors(ELLIPSE, ELLIPSE)
     found = identify(runs, robot, OutputError(free=FREE, ladder=True), groups=PER)
@@ -112,6 +113,7 @@ def test_right_floors_take_no_step():
     assert ladder(found).end.code == "only_noise"
 
 
+@pytest.mark.long
 def test_what_is_shared_is_switched_on_in_all():
     """A frame that turns, of which the file knows nothing."""
     runs, robot, _ = floors(BOX, BOX, frame=True)

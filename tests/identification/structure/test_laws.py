@@ -23,6 +23,7 @@ from omnidyn.model.robot_file import load_robot
 
 
 @pytest.mark.parametrize("name, seed", [("Dahl", 1), ("LuGre", 0)])
+@pytest.mark.long
 def test_a_law_that_the_file_lacks_is_named_and_taken(name, seed):
     """Its fall, or the way that bristles bend, is 10 standard errors: found, first or second, the first step, and
     only noise is left. Of Dahl and LuGre each has a key of its own. (Of Dahl's log 0 one of two 95 % intervals misses.)
@@ -41,6 +42,7 @@ def test_a_law_that_the_file_lacks_is_named_and_taken(name, seed):
         pytest.param(7, id="without the law viscous friction stands at its bound"),
     ],
 )
+@pytest.mark.long
 def test_a_law_of_five_standard_errors_is_taken(seed):
     """Logs in which it went unseen: numbers of axes at rest were counted, those at a bound not, noise was too long."""
     log, early = of_law("Stribeck", 5.0, seed)

@@ -17,6 +17,7 @@ from tests.support.laws_in_place import DIRECTION, NAMED, NOISE, WHEELS, climbed
         (WHEELS, "Stribeck", 0),
     ],
 )
+@pytest.mark.some(1)
 def test_a_law_is_taken_in_its_place(place, law, seed):
     """In one step, with every number of its own, behind which there is nothing but noise."""
     found = climbed(place, law, seed, NOISE[place, law])
@@ -28,5 +29,6 @@ def test_a_law_is_taken_in_its_place(place, law, seed):
 
 
 @pytest.mark.parametrize("place", [DIRECTION, WHEELS])
+@pytest.mark.some(1)
 def test_a_right_law_is_kept(place):
     assert climbed(place, "none", 0, 0.005).ladder.taken == ()

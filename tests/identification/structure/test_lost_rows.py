@@ -69,6 +69,7 @@ def test_what_is_no_loss():
 
 
 @pytest.mark.parametrize(("seed", "sensor"), [(44, SPEEDS), (47, TICKS), (50, AR)])
+@pytest.mark.some(1)
 def test_what_lost_rows_explain_is_no_lack_of_fit(seed, sensor):
     """Right worlds, which were said to leave something out."""
     case = right_case(seed).setup_but(sensor=sensor, memory=0.8 if sensor == AR else 0.0)

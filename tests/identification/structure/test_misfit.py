@@ -36,6 +36,7 @@ def remembered(rho, seed):
 
 
 @pytest.mark.parametrize(("rho", "seed"), [(0.0, 7), (0.9, 9), (0.98, 8)])
+@pytest.mark.some(1)
 def test_a_memory_alone_is_no_lack_of_fit(rho, seed):
     assert not identify(remembered(rho, seed), AXEBOT, OutputError(nuisances=())).lack_of_fit.found
 
@@ -62,6 +63,7 @@ def test_friction_at_the_wheels_under_a_box_is_found_by_counts():
     assert fit.lack_of_fit.remedies[0].key == "friction.wheels"
 
 
+@pytest.mark.long
 def test_a_gross_misfit_of_angles_is_found():
     """A current limit under a file without one: viscous friction 12 times too large. Rows in which an encoder counts
     next to nothing are no rows of the residuals: taken as if none were missing there, their memory told nothing."""
@@ -125,6 +127,7 @@ def test_wheels_that_slip_at_random_are_no_lack_of_fit(seed):
 
 
 @pytest.mark.parametrize("kind", ["resistance", "Stribeck"])
+@pytest.mark.some(1)
 def test_a_wrong_model_of_a_robot_with_encoders_is_found(kind):
     """The sum of counts wanders where the model is wrong: it was taken for a memory that says nothing."""
     case, _, _ = drawn(by_name(kind), 69)
@@ -168,6 +171,7 @@ def lack(kind, number=61, nuisances=None):
 
 
 @pytest.mark.parametrize("kind", ["backward", "sag"])
+@pytest.mark.some(1)
 def test_what_nobody_offers_is_found_and_has_no_confident_remedy(kind):
     found = lack(kind, nuisances=("latency",))
     assert found.found
@@ -187,6 +191,7 @@ def test_a_force_in_the_room_is_called_one():
         ("payload", "change"),
     ],
 )
+@pytest.mark.some(1)
 def test_the_cause_is_named_first(kind, key):
     """Others in test_remedies.py, and in bench wrong_worlds."""
     found = lack(kind)
@@ -196,6 +201,7 @@ def test_the_cause_is_named_first(kind, key):
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.1])
+@pytest.mark.some(1)
 def test_logs_with_other_sensors_are_diagnosed_together(scale):
     """One log has the speeds of the body, the other those of the wheels too, of which one may read 10 % more."""
     of_body = remembered(0.0, 7)

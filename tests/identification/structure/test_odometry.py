@@ -29,6 +29,7 @@ def log(wheels):
 
 
 @pytest.mark.parametrize("key", WORLDS)
+@pytest.mark.some(1)
 def test_a_log_of_odometry_names_the_radius_beside_what_looks_like_it(key):
     wheels, looks = WORLDS[key]
     lack = identify(log(wheels), AXEBOT, OutputError()).lack_of_fit

@@ -48,6 +48,7 @@ def right():
 
 
 @pytest.mark.parametrize("key", WORLDS)
+@pytest.mark.some(2)
 def test_what_is_missing_is_named_first(key):
     lack = lack_of(key)
     assert lack.found

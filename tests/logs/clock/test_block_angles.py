@@ -12,6 +12,7 @@ PERIOD = 100.53
 
 @pytest.mark.parametrize("block", [1, 3, 50])
 @pytest.mark.parametrize("at", [1200, 1201, 1234])  # at the start of a block, a row later, within one
+@pytest.mark.some(4)
 def test_the_angle_goes_on_over_what_a_counter_does(block, at):
     def error(readings, t=T):
         wheel = BlockAngle((2.0 * np.pi, PERIOD))

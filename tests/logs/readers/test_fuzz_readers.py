@@ -33,6 +33,7 @@ def test_whatever_a_file_holds_only_our_errors_leave_a_reader(name):
 
 
 @pytest.mark.parametrize("reader", [name for name in READERS if name.startswith("read_log, ") or name == "info"])
+@pytest.mark.some(4)
 def test_half_a_second_of_it(reader):
     needed()
     table = measure(0.5, [reader], seed=12)

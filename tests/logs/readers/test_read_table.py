@@ -292,6 +292,7 @@ NOTHING = {"blank": "\n", "spaces": "   \n", "comments": "# a logger says so and
 
 @pytest.mark.parametrize("nothing", NOTHING.values(), ids=NOTHING)
 @pytest.mark.parametrize("place", ["first", "under the header", "among the rows", "last"])
+@pytest.mark.some(5)
 def test_megabytes_of_nothing_are_passed_over(tmp_path, nothing, place):
     size = 5 * 2**20 // len(nothing)
     head, rows = "t_s,x_m\n", ROWS_OF_HEAD

@@ -20,6 +20,7 @@ from tests.support.mixed_robots import random_robot
 
 PROBLEMS = 10  # for each of the 100 robots
 ROBOTS = 100
+PARTS = 10
 COUNTS: list[int] = []
 
 
@@ -135,10 +136,11 @@ def faults(p, x, count):
     return [words for words, wrong in found.items() if wrong]
 
 
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.some(1)
 def test_solutions_satisfy_the_law(part):
     """1000 problems: all shapes, sums, asymmetric levels, breakaway, gears, drops, limits, 3 to 6 wheels, turning."""
-    per_part, wrong = ROBOTS * PROBLEMS // 4, {}
+    per_part, wrong = ROBOTS * PROBLEMS // PARTS, {}
     for seed in range(part * per_part, (part + 1) * per_part):
         p, x = problem(seed)
         COUNTS.append(solve(*p, x))
@@ -189,6 +191,7 @@ def potential(p, x):
 
 
 @pytest.mark.parametrize("seed", range(0, 40, 8))
+@pytest.mark.some(2)
 def test_the_solution_is_the_minimum_of_the_potential(seed):
     """Brute force: no point near or far, nor what Nelder-Mead finds from three starts, lies below it."""
     random = np.random.default_rng(seed)

@@ -59,6 +59,7 @@ def holds(robot, voltage):
 
 
 @pytest.mark.parametrize("seed", range(0, 40, 2))
+@pytest.mark.some(6)
 def test_what_holds_is_what_the_program_says(seed):
     """Voltages around the dead zone of 20 robots of every shape; a draw nearer than 1e-7 to an edge is not judged."""
     robot, random = random_robot(seed), np.random.default_rng(seed)

@@ -48,6 +48,7 @@ def on_the_grid_of_commands(robot, latency):
 
 @pytest.mark.parametrize("latency", LATENCIES)
 @pytest.mark.parametrize("name", list(ROBOTS))
+@pytest.mark.some(4)
 def test_a_late_robot_takes_whole_steps_between_its_commands(name, latency):
     robot = ROBOTS[name]
     run = omnidyn.simulate_batch([late(robot, latency)] * 3, VOLTS, DT, every=1)
@@ -84,6 +85,7 @@ def test_implicit_steps_are_as_near_as_without_a_latency(name):
 
 @pytest.mark.parametrize("name", list(ROBOTS))
 @pytest.mark.parametrize("pose", [None, "fast", "exact"])
+@pytest.mark.some(3)
 def test_bits_do_not_depend_on_company_on_what_is_kept_or_on_stretches(name, pose):
     latencies = [LATENCIES[k % 4] for k in range(70)]
     latencies[3] = 0.0

@@ -61,6 +61,7 @@ def volts_of(random, n):
 
 
 @pytest.mark.parametrize("seed", range(20))
+@pytest.mark.some(7)
 def test_it_is_the_general_engine_within_its_tolerance(seed):
     random = np.random.default_rng(seed)
     robot = robot_of(random)

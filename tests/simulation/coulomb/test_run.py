@@ -89,6 +89,7 @@ def keys_of(robot):
 @pytest.mark.parametrize(
     "name", [name for name in ROBOTS if name not in ("plain ellipse", "box without a turning frame")]
 )
+@pytest.mark.some(5)
 def test_the_twist_and_the_pose_against_the_modes(name):
     """DOP853 restarted at every event: the error follows the tolerance, what rests is exactly 0."""
     robot = ROBOTS[name]
@@ -107,6 +108,7 @@ def test_the_twist_and_the_pose_against_the_modes(name):
 
 
 @pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.some(5)
 def test_derivatives_are_those_of_the_general_engine(name):
     """At tolerance 1e-8, of ten numbers and more: within 1e-3, half of them within 1e-5."""
     robot = ROBOTS[name]
@@ -180,6 +182,7 @@ def test_derivatives_by_volts_pushes_and_the_start_are_differences():
 
 
 @pytest.mark.parametrize("name", ["ellipse", "box", "unequal motors, at most 2.5 A"])
+@pytest.mark.some(1)
 def test_motors_coast_as_in_the_general_engine(name):
     """A duty of 0 leaves a motor without current, one or all; derivatives too."""
     robot = ROBOTS[name]

@@ -15,6 +15,7 @@ SETTING = Setting(duration=0.14, substeps=2, randomise={"body.mass_kg": Range(0.
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
 @pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.some(5)
 def test_the_same_bits_as_a_plain_loop(dtype, autoreset, threads):
     count, random = 70, np.random.default_rng(3)
     envs = Environments(AXEBOT, count, SETTING, autoreset=autoreset, dtype=dtype, threads=threads)

@@ -36,6 +36,7 @@ def test_table_3_over_10_000_steps(stored, ratio):
 
 
 @pytest.mark.parametrize("seed", range(ROBOTS))
+@pytest.mark.some(12)
 def test_random_robots(seed):
     """Every number of Table 3 changed by up to 50 %, 3 to 6 wheels, every other one with steps from 1e-5 to 0.1 s."""
     p = random_robot(seed)

@@ -204,6 +204,7 @@ SWINGING = [(0.1, 1.3, 0.05), (0.1, 1.0, 0.9), (0.5, 1.3, 2.0)]  # complex roots
 
 
 @pytest.mark.parametrize("inductance, ratio, h", [*product(INDUCTANCES, RATIOS, STEPS), *SWINGING])
+@pytest.mark.some(7)
 def test_meets_dop853_with_stops_dips_and_releases_inside_the_step(inductance, ratio, h):
     robot, random = table_3(inductance, ratio), np.random.default_rng(int(1e6 * inductance + 10 * ratio + 1e4 * h))
     seen, worst = Counter(), np.zeros(3)
@@ -223,6 +224,7 @@ def test_meets_dop853_with_stops_dips_and_releases_inside_the_step(inductance, r
 
 
 @pytest.mark.parametrize("seed", range(6))
+@pytest.mark.some(2)
 def test_meets_dop853_over_programs_of_random_robots(seed):
     physical = random_robot(seed)
     robot, random = dynamic(robot_of(physical), (2e-3, 2e-2)[seed % 2]), np.random.default_rng(seed)
@@ -247,6 +249,7 @@ def exponential(law, t, v, f, g, s):
 
 
 @CASES
+@pytest.mark.some(6)
 def test_meets_matrix_exponentials_where_nothing_happens(inductance, ratio, h):
     robot, random, laws = table_3(inductance, ratio), np.random.default_rng(6), axis_laws(table_3(inductance, ratio))
     gain = current_gain(robot)
@@ -293,6 +296,7 @@ def test_response_in_every_regime():
 
 
 @CASES
+@pytest.mark.some(6)
 def test_a_step_is_the_sum_of_its_parts(inductance, ratio, h):
     robot, random = table_3(inductance, ratio), np.random.default_rng(8)
     for _ in range(100):

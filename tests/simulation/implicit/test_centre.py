@@ -81,6 +81,7 @@ def by_centre_of_mass(robot, voltage, dt, force, start=(0.0, 0.0, 0.0)):
 
 @pytest.mark.parametrize("spin", [0.0, 3.0])
 @pytest.mark.parametrize("seed", SCALAR)
+@pytest.mark.some(10)
 def test_random_robots_against_the_modes_of_the_centre_of_mass(seed, spin):
     """Every option of motors, dry friction on axes and wheels, with rotors and without: stops, rests, reversals."""
     robot = with_centre(with_spin(random_robot(seed), seed, spin), seed + 40)  # of 16, 16 is a tie of the reference
@@ -89,6 +90,7 @@ def test_random_robots_against_the_modes_of_the_centre_of_mass(seed, spin):
 
 
 @pytest.mark.parametrize("seed", [seed for seed in SCALAR if eager(seed)][:6])
+@pytest.mark.some(3)
 def test_friction_that_falls_with_the_speed_against_the_modes(seed):
     robot = with_centre(with_stribeck(random_robot(seed), seed), seed)
     voltage, dt = (each[:8] for each in random_voltages(robot, seed))
@@ -98,6 +100,7 @@ def test_friction_that_falls_with_the_speed_against_the_modes(seed):
 
 
 @pytest.mark.parametrize("seed", SCALAR[:6])
+@pytest.mark.some(3)
 def test_friction_that_bends_against_its_differential_equation(seed):
     robot = with_centre(with_bristles(random_robot(seed), seed), seed)
     voltage, dt = (each[:6] for each in random_voltages(robot, seed))
@@ -139,6 +142,7 @@ def test_a_centre_in_the_middle_would_not_do(seed):
 
 
 @pytest.mark.parametrize("seed", [0, 2, 3, 10])
+@pytest.mark.some(2)
 def test_the_reference_keeps_its_energy_and_meets_a_stepper_without_modes(seed):
     robot = with_centre(random_robot(seed), seed)
     voltage, dt = (each[:ROWS] for each in random_voltages(robot, seed))
@@ -153,6 +157,7 @@ def test_the_reference_keeps_its_energy_and_meets_a_stepper_without_modes(seed):
 
 
 @pytest.mark.parametrize("seed", [0, 3, 17])
+@pytest.mark.some(1)
 def test_the_error_follows_the_tolerance(seed):
     robot = with_centre(random_robot(seed), seed)
     voltage, dt = (each[:ROWS] for each in random_voltages(robot, seed))

@@ -93,6 +93,7 @@ def missing(robot, levels, block, rows, tol):
 
 @pytest.mark.parametrize("motor", MOTORS)
 @pytest.mark.parametrize("shape", [s for s in SHAPES if s not in ("disc", "wheels, breakaway")])
+@pytest.mark.some(11)
 def test_the_energy_balance_closes(shape, motor):
     """Ten random levels of 40 ms with reversals, stops and rests: closed to 10 tol [J] after every one of them."""
     robot = shaped(shape, **MOTORS[motor])

@@ -63,6 +63,7 @@ def test_a_row_cut_short_by_a_latency_does_not_cut_the_steps_after_it():
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.some(11)
 def test_adaptive_against_the_modes(seed):
     """DOP853 mode by mode: <= 1e-6 m/s and 1e-5 rad/s at tol 1e-7; pose, currents and what rests beside it."""
     robot, truth = random_robot(seed), truth_of(seed)
@@ -80,6 +81,7 @@ def test_adaptive_against_the_modes(seed):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.some(11)
 def test_the_error_follows_the_tolerance(seed):
     """`tol` is the global error [m/s], 10 tol [rad/s]."""
     robot, truth = random_robot(seed), truth_of(seed)
@@ -115,6 +117,7 @@ FORGETFUL = {
 
 
 @pytest.mark.parametrize("name", FORGETFUL)
+@pytest.mark.long
 def test_the_error_follows_the_tolerance_however_long_a_robot_remembers(name):
     """DOP853: nothing but the local share of `tol` keeps errors from adding up where motors do not damp them."""
     robot, start = FORGETFUL[name], (1.0, 0.3, 5.0)

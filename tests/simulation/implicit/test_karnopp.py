@@ -46,7 +46,8 @@ def pushes(rows, wheels, seed=0):
     return random.uniform(-4.0, 4.0, (rows, wheels)) * random.choice([0.1, 0.5, 1.0], (rows, 1))
 
 
-@pytest.mark.parametrize("seed", [*SETTLED[:9], *(pytest.param(seed, marks=pytest.mark.long) for seed in SETTLED[9:])])
+@pytest.mark.parametrize("seed", SETTLED)
+@pytest.mark.some(4)
 def test_against_events(seed):
     """Nine robots, with --long 23, all places, three to six wheels: within tol, and at rest in the same rows."""
     robot = with_band(random_robot(seed), seed)

@@ -43,12 +43,14 @@ def program(rows, scale, seed=0):
 
 
 @pytest.mark.parametrize("seed", EAGER)
+@pytest.mark.some(6)
 def test_what_falls_with_the_speed_against_events(seed):
     """Twenty robots, everything mixed: within tol [m/s], 10 tol [rad/s], and at rest in the same rows."""
     meet_events(with_stribeck(random_robot(seed), seed), seed)
 
 
 @pytest.mark.parametrize("seed", range(20))
+@pytest.mark.some(6)
 def test_what_bends_against_its_differential_equation(seed):
     """Dahl and LuGre on axes, direction and wheels, twenty robots: within tol [m/s], 10 tol [rad/s]."""
     robot = with_bristles(random_robot(seed), seed)
@@ -267,6 +269,7 @@ def test_lugre_of_1995_breaks_away_at_less_the_faster_the_force_rises():
     ],
     ids=["Dahl", "LuGre", "Stribeck", "breakaway", "Coulomb"],
 )
+@pytest.mark.some(3)
 def test_bristles_drift_under_a_force_that_swings_below_breakaway_and_nothing_else_does(more, drift):
     """1.1 +- 0.5 N at 20 Hz on the paper's robot: [m in 2 s], as its differential equation has it; 1.1 N: none."""
     t = (np.arange(2000) + 0.5) * 1e-3

@@ -43,6 +43,7 @@ def pushes(rows, seed=0, scale=4.0):
 
 
 @pytest.mark.parametrize("law, seed", [(law, seed) for law, seeds in SEEDS.items() for seed in seeds])
+@pytest.mark.some(7)
 def test_against_its_differential_equation(law, seed):
     """Eleven robots each, wherever they have friction: within tol [m/s], 10 tol [rad/s], and the pose."""
     robot = with_bristles(random_robot(seed), seed, (law,))
@@ -89,6 +90,7 @@ def _turning(angle):
 
 
 @pytest.mark.parametrize("law", LAWS)
+@pytest.mark.some(1)
 def test_energy_never_rises(law):
     """Without voltage, from bristles bent at random: 1/2 v M v + sigma0 |z|^2/2 falls at every row, disc or ellipse."""
     robot = along(coulomb=(2.6, 1.3), stiffness=2e3, yaw_coulomb=0.1, **LAWS[law])

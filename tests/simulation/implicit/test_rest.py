@@ -27,6 +27,7 @@ def all_zero(*arrays):
 @pytest.mark.parametrize("fixed", [False, True])
 @pytest.mark.parametrize("motor", MOTORS)
 @pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.some(13)
 def test_held_for_a_minute(shape, motor, fixed):
     """At 50 % and 95 % of breakaway, four directions: displacement exactly 0 after 60 s; and it moves at 100.1 %."""
     robot = shaped(shape, **MOTORS[motor])

@@ -39,6 +39,7 @@ def program(rows, seed, every=1):
 
 @pytest.mark.parametrize("shape", OTHERS)
 @pytest.mark.parametrize("seed", range(1, 29, 2))
+@pytest.mark.some(5)
 def test_it_falls_against_events(shape, seed):
     """Fourteen robots, axes, direction, wheels and all mixtures: within tol, and at rest in the same rows."""
     meet_events(shaped(with_stribeck(random_robot(seed), seed), shape), seed)

@@ -79,6 +79,7 @@ def test_what_is_not_driven_stays_at_rest_to_the_last_bit():
 
 @pytest.mark.parametrize("heavy", [1.0, 20.0])
 @pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 9, 10, 13, 17, 21, 24, 33])
+@pytest.mark.some(7)
 def test_random_robots_against_the_modes(seed, heavy):
     """Every option, unequal rotors and wheels of 10 to 400 % of the mass: DOP853 mode by mode knows both."""
     robot = with_spin(random_robot(seed), seed, heavy)
@@ -89,6 +90,7 @@ def test_random_robots_against_the_modes(seed, heavy):
 
 
 @pytest.mark.parametrize("seed", [0, 3, 17])
+@pytest.mark.some(1)
 def test_the_error_follows_the_tolerance(seed):
     robot = with_spin(random_robot(seed), seed, 3.0)
     voltage, dt = (each[:ROWS] for each in random_voltages(robot, seed))
@@ -108,6 +110,7 @@ def test_the_body_alone_would_not_do():
 
 
 @pytest.mark.parametrize("seed", [0, 2, 4, 10])
+@pytest.mark.some(2)
 def test_the_reference_keeps_its_energy_and_meets_a_stepper_without_modes(seed):
     """Kinetic energy 1/2 nu M nu; the Moreau stepper is of first order: an eighth of the error for an eighth of h."""
     robot = with_spin(random_robot(seed), seed)

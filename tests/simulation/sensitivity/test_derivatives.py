@@ -125,6 +125,7 @@ def test_against_the_exact_engine(axebot):
     assert (twist[59, 1:] == 0.0).all(), "no stop"
 
 
+@pytest.mark.long
 def test_ellipse_wheels_and_current_limit(ellipse):
     """Reversals and stops of wheels, currents that leave their limit inside a row."""
     keys = [*BODY, MOTOR[2], "motor.current_limit_A", "friction.direction.coulomb[0]"]
@@ -144,6 +145,7 @@ def test_at_every_tolerance(ellipse):
             assert max(errors) <= AGREES
 
 
+@pytest.mark.long
 def test_unequal_motors_with_dynamic_electrics(unequal):
     keys = [*BODY[::3], "motor.torque_constant_Nm_A[1]", "motor.resistance_ohm[3]", "motor.inductance_H[0]"]
     keys += ["friction.axes.viscous[0]", "friction.axes.coulomb[1]"]
@@ -180,6 +182,7 @@ def test_currents_that_pass_zero_against_a_voltage_drop(unequal):
 
 
 @pytest.mark.parametrize("electrical", ["quasi-static", DYNAMIC])
+@pytest.mark.long
 def test_lossy_gears(axebot, electrical):
     """Gears that lose while they drive and lose while they are driven, and hold what rests."""
     motor = axebot.motor.replace(gear_efficiency=(0.75, 0.8, 0.7), electrical=electrical, inductance=0.004)
@@ -191,6 +194,7 @@ def test_lossy_gears(axebot, electrical):
 
 @pytest.mark.parametrize("electrical", ["quasi-static", DYNAMIC])
 @pytest.mark.parametrize("off", ["brake", "coast"])
+@pytest.mark.some(1)
 def test_duty_of_a_supply(axebot, off, electrical):
     """voltage = duty * supply, by the chain rule; at a duty of 0 the motor brakes, or carries no current."""
     motor = axebot.motor.replace(electrical=electrical, inductance=0.004)
@@ -229,6 +233,7 @@ def test_what_sticks_has_a_derivative_of_exactly_0(axebot):
     assert (found.twist[45][2] != 0.0).any()
 
 
+@pytest.mark.long
 def test_a_wheel_that_sticks_while_the_robot_turns(axebot):
     """Wheel 1 holds: -v_y + b omega = 0, whatever the parameter, b included."""
     friction = Friction(

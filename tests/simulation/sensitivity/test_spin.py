@@ -59,6 +59,7 @@ def test_against_the_exact_engine(heavy):
     assert (found.run.twist[45:60] == 0.0).any()
 
 
+@pytest.mark.long
 def test_against_the_modes(unequal):
     """A mass that couples the axes, wheels that stop and reverse, a current limit, a turning frame."""
     keys = [f"{ROTOR}[1]", f"{WHEEL}[2]", "motor.gear_ratio", "motor.gear_ratio[0]", "wheels.wheel_radius_m[1]"]
@@ -79,6 +80,7 @@ def test_a_centre_of_mass_beside_the_wheels(unequal):
 
 
 @pytest.mark.parametrize("volts, omega", [((0.6, 0.7, -1.4), 1.0), ((0.5, 2.0, -2.8), 2.3)])
+@pytest.mark.some(1)
 def test_a_stop_that_lets_another_axis_go(axebot, volts, omega):
     """While it slows down, yaw holds y against what drives it, and lets it go as it stops: one instant for both."""
     robot = axebot.replace(body=axebot.body.replace(centre=(0.06, 0.0)))
@@ -110,6 +112,7 @@ def test_a_first_step_of_the_centre_from_the_middle(unequal):
         assert worst(found.twist[..., k], (up - down) / 2e-4) <= 1e-4
 
 
+@pytest.mark.long
 def test_dynamic_electrics(unequal):
     motor = unequal.motor.replace(electrical="dynamic", inductance=0.004)
     keys = [f"{ROTOR}[0]", "motor.gear_ratio", "motor.inductance_H"]

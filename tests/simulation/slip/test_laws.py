@@ -175,6 +175,7 @@ def meets_the_events(number, tol):
 
 
 @pytest.mark.parametrize("number", FIRST, ids=[*LAWS, *MORE, *ALONG])
+@pytest.mark.some(4)
 def test_each_law_against_the_events(number):
     """Within tol [m/s] and [m], 10 tol [rad/s] and [rad]; rims within 10 tol [m/s]."""
     meets_the_events(number, 1e-6)
@@ -262,6 +263,7 @@ BENT = re.compile("dahl|lugre|elastoplastic")
 
 
 @pytest.mark.parametrize("name", ROBOTS_OF)
+@pytest.mark.some(7)
 def test_with_more_grip_than_is_asked_for_it_is_the_engine_of_wheels_that_roll(name):
     grips = slippery(ROBOTS_OF[name], 100.0)
     rolls, u = grips.replace(wheels=grips.wheels.replace(traction_mu=None)), volts(3)
@@ -323,6 +325,7 @@ def test_it_takes_energy_and_gives_none(name):
 @pytest.mark.parametrize(
     "name, key", [("breakaway", "coulomb"), ("stribeck", "breakaway"), ("lugre", "coulomb"), ("winding", "viscous")]
 )
+@pytest.mark.some(2)
 def test_derivatives_follow(name, key):
     """Those of slipping_samples, by runs in fixed steps, are near differences of far more accurate runs."""
     robot, along = slippery(ROBOTS_OF[name], 0.6), np.outer([5.0, 0.0, -5.5, -3.0], [0.1, 1.0, -1.0])
@@ -351,6 +354,7 @@ STEPWISE = np.repeat(volts(8, 6), 50, axis=0)
 
 
 @pytest.mark.parametrize("name", PLANE)
+@pytest.mark.some(2)
 def test_stiff_bristles_along_the_way_are_coulomb_friction(name):
     """The difference, of how it stops, falls as the root of the stiffness; and steps of 5 ms are near."""
     coulomb, own = shaped("ellipse"), ROBOTS_OF[name].friction.direction.replace(**ONE_LEVEL)
@@ -368,6 +372,7 @@ def test_stiff_bristles_along_the_way_are_coulomb_friction(name):
 
 
 @pytest.mark.parametrize("name", PLANE)
+@pytest.mark.some(2)
 def test_what_bends_along_the_way_gives_no_energy(name):
     """Without voltage, bristles bent before: kinetic energy, that of the wheels too, and sigma0 |z|^2/2 fall."""
     way = ROBOTS_OF[name].friction.direction.replace(**ONE_LEVEL)
@@ -389,6 +394,7 @@ def test_what_bends_along_the_way_gives_no_energy(name):
 
 
 @pytest.mark.parametrize("number", [ROBOTS.index(law) for law in ALONG], ids=ALONG)
+@pytest.mark.some(2)
 def test_derivatives_by_the_grip_beside_what_bends_are_those_of_the_events(number):
     """d twist/d traction_mu, by runs in fixed steps of 1 ms, against differences of the event-driven reference."""
     robot, levels = reference(number)[:2]

@@ -37,6 +37,7 @@ LONG = [pytest.param(seed, marks=pytest.mark.long) for seed in range(4, 8)]
 
 
 @pytest.mark.parametrize("seed", [*range(4), *LONG])
+@pytest.mark.some(2)
 def test_against_the_events(seed):
     """Random grip, wheels, frame and levels: within tol [m/s], 10 tol [rad/s], the rims too, of DOP853 by events."""
     rng = np.random.default_rng(seed)
@@ -69,6 +70,7 @@ def meet_slip(robot, body, seed):
 
 
 @pytest.mark.parametrize("seed", [*range(3), *LONG])
+@pytest.mark.some(1)
 def test_loads_that_shift_against_the_events(seed):
     """The same with a centre of mass at a height of up to 0.4 of where the wheels stand."""
     rng = np.random.default_rng(100 + seed)
@@ -193,6 +195,7 @@ def test_slip_takes_energy_and_gives_none():
 
 
 @pytest.mark.parametrize("seed", [*range(4), *LONG])
+@pytest.mark.some(2)
 def test_a_centre_of_mass_beside_the_wheels_against_the_events(seed):
     """The same with its centre of mass off by up to 0.4 of where the wheels stand: unequal loads, coupled masses.
 
@@ -310,6 +313,7 @@ def test_what_mecanum_wheels_carry_is_statics():
 
 
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (0.015, -0.01)])
+@pytest.mark.some(1)
 def test_mecanum_wheels_under_a_high_centre_meet_the_events(centre):
     """Their grip is that along the axle of a roller, cos 45 degrees of it along their own way."""
     robot = slippery(standing(MECANUM, 0.26), 0.25, centre=centre, centre_height=0.06)

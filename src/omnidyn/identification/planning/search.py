@@ -90,7 +90,8 @@ def chosen(
         if not possible.size:
             return order
         now = score(_inverse(total))
-        gains = [(now - score(_inverse(total + information[k]))) / durations[k] for k in possible]
+        after = _inverse(total + information[possible])
+        gains = [(now - score(covariance)) / durations[k] for k, covariance in zip(possible, after, strict=True)]
         best = int(possible[int(np.argmax(gains))])
         order.append(best)
         total = total + information[best]

@@ -62,6 +62,7 @@ def controller_file(folder, options):
 
 
 @pytest.mark.parametrize("robot, options", VARIANTS.values(), ids=VARIANTS)
+@pytest.mark.some(4)
 def test_every_step_is_that_of_python(robot, options, tmp_path):
     follow, rng, apart = path("zigzag"), np.random.default_rng(1), []
     live = LiveRobot(robot, 0.02, pose=follow.at(0.0).pose)
@@ -89,6 +90,7 @@ def in_double(text):
 @pytest.mark.parametrize(
     "drive", [ROBOT.drive, SUMMED.replace(latency=0.0), SUMMED], ids=["volts", "loop", "late loop"]
 )
+@pytest.mark.some(2)
 def test_in_double_precision_its_formulas_are_those_of_python(sensors, drive, tmp_path):
     """What float32 hides: every number of the observer, the model and the program."""
     robot = ROBOT.replace(sensors=sensors, drive=drive)
@@ -123,6 +125,7 @@ def test_in_double_precision_its_formulas_are_those_of_python(sensors, drive, tm
 
 
 @pytest.mark.parametrize("name", ["eight", "eight:period_s=3.2"])
+@pytest.mark.some(1)
 def test_it_drives_the_simulated_robot_as_python_does(name, tmp_path):
     with CController(ROBOT, tmp_path / "c", "mpc") as control:
         in_c, own = (omnidyn.track(ROBOT, name, each, duration=4.0) for each in (control, "mpc"))

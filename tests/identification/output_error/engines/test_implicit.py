@@ -255,6 +255,7 @@ def turning(axebot):
     return axebot.replace(body=axebot.body.replace(rotating_frame=True))
 
 
+@pytest.mark.long
 def test_counts_and_positions_of_an_independent_run(turning):
     """Encoders of 2048 counts, and motion capture, of a run by DOP853: z-scores of all draws are those of a normal."""
     run, angle = rolled(turning, excitation(5.0, seed=1), 0.01)

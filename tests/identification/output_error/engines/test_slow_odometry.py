@@ -91,6 +91,7 @@ def run_of(driven, every, first=0, moved=0, channels=("twist", "wheel_speed")):
 
 @pytest.mark.parametrize("every, first", [(1, 0), (2, 0), (2, 1), (5, 3), (10, 0), (10, 9)])
 @pytest.mark.parametrize("channels", [("twist", "wheel_speed"), ("twist",)])
+@pytest.mark.some(4)
 def test_a_log_begins_at_rest_whatever_the_clock_of_its_odometry(driven, robot, every, first, channels):
     records = read_records([run_of(driven, every, first, channels=channels)], robot, OutputError())
     (piece,) = loop_pieces(records, robot, "auto")

@@ -193,16 +193,16 @@ def test_two_floors_share_the_gains(looped):
     assert abs(change.difference - 0.66) < 4.5 * change.std
 
 
-def test_groups_find_the_latency_of_currents_behind_a_slow_loop(looped):
+@pytest.mark.parametrize("own", [(), pytest.param(("friction", "latency.current"), marks=pytest.mark.long)], ids=str)
+def test_groups_find_the_latency_of_currents_behind_a_slow_loop(looped, own):
     """No descent crosses a tick of 20 ms: each group alone tries one after the other, and so must all together."""
     slow = looped.replace(drive=looped.drive.replace(rate=50.0))
     runs = [log(slow, seed, 300, late=23) for seed in (1, 2)]
-    for own in ((), ("friction", "latency.current")):
-        found = identify(runs, slow, OutputError(per_free=own, nuisances=("latency",)), groups=["a", "b"])
-        for estimate in found.groups.values():
-            late = estimate.nuisances["latency.current"]
-            assert abs(late.value - 0.023) < max(4.5 * late.std, 5e-4)
-            assert late.std < 1e-3
+    found = identify(runs, slow, OutputError(per_free=own, nuisances=("latency",)), groups=["a", "b"])
+    for estimate in found.groups.values():
+        late = estimate.nuisances["latency.current"]
+        assert abs(late.value - 0.023) < max(4.5 * late.std, 5e-4)
+        assert late.std < 1e-3
 
 
 def test_a_voltage_beside_the_set_speeds_is_the_input_unless_a_gain_is_asked_for(looped):
@@ -262,6 +262,7 @@ def test_a_latency_of_currents_that_went_astray_is_tried_where_the_others_are(lo
     assert abs(found.values[astray]) <= 0.01
 
 
+@pytest.mark.long
 def test_motors_that_are_wrong_guesses_come_before_latencies(looped):
     """Torque twice too large, a resistance that is a guess: with all at once the latencies end in another valley."""
     start = wrong(looped, **{KP: 1.0, RESISTANCE: 0.3, TORQUE: 2.0, EMF: 2.0})

@@ -149,6 +149,7 @@ def test_the_diagnosis_names_a_slope_of_a_robot_that_turns(axebot, clean):
     assert "constant_force" in codes(by_default.warnings)
 
 
+@pytest.mark.long
 def test_the_diagnosis_names_a_push_in_the_body(axebot, clean):
     run = pushed(axebot, clean.voltage[:-1], PUSHED * [1.0, 0.0, 0.0])
     log = Run(

@@ -20,6 +20,7 @@ def counted():
 
 @pytest.mark.parametrize("factor", [0.4, 2.0])
 @pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.some(2)
 def test_counts_that_are_late_are_fitted_from_friction_far_off(counted, number, factor):
     wrong = with_friction(AXEBOT, [factor * value for value in TRUTH.values()])
     solution = Fit.of([counted[number]], wrong, QUESTION).solve()

@@ -52,6 +52,7 @@ class Cut(FitProgress):
 @pytest.mark.parametrize(
     "cut", [Cut(count=1), Cut(words="trying latency.current"), Cut(words="finding how sure")], ids=["1", "2", "3"]
 )
+@pytest.mark.some(2)
 def test_an_interrupted_fit_of_set_speeds_leaves_the_best_so_far(looped, log, cut):
     """In the first search for a start, between two descents, and after the last one."""
     asked = Fit.of(log, looped, OutputError())

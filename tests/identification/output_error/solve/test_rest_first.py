@@ -51,6 +51,7 @@ def light(tmp_path_factory):
 
 
 @pytest.mark.parametrize("rest", [0.5, REST])
+@pytest.mark.some(1)
 def test_a_rest_first_is_no_place_to_begin(light, rest):
     """Friction along both axes and about yaw."""
     solution = Fit.of([counted(LIGHT, rest)], light, OutputError()).solve()

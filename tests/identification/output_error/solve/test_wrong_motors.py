@@ -31,6 +31,7 @@ def noisy(values, std):
 
 
 @pytest.mark.parametrize(("resistance", "constant"), [(4.0, 0.5), (0.25, 0.5), (4.0, 2.0)])
+@pytest.mark.some(2)
 def test_currents_find_their_latency_beside_a_motor_that_is_a_wrong_guess(true, run, resistance, constant):
     """It stayed at -0.1 s or a part of a row, and resistance and currents with it."""
     log = run.replace(twist=noisy(run.twist, 0.005), current=noisy(run.current, 0.02), wheel_speed=None, pose=None)

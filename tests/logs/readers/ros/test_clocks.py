@@ -263,6 +263,7 @@ def test_a_bag_of_a_simulation_lasts_as_long_as_its_stamps_say(tmp_path, pace, p
 
 
 @pytest.mark.parametrize("seed", range(24))
+@pytest.mark.some(7)
 def test_only_what_was_lost_is_lost_at_any_pace(tmp_path, seed):
     """A real-time factor of .1 to 10, a pause and a stall of up to 60 s, jitter; in every other bag 40 are lost."""
     pytest.importorskip("mcap")

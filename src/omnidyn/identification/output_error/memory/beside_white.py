@@ -44,8 +44,9 @@ def scored(
 
     evaluate: (cost, gradient (2,), Gauss-Newton's or Fisher's matrix (2, 2), variance) of two numbers, in one scale.
     """
-    numbers: FloatArray = min(map(np.array, starts), key=lambda start_numbers: evaluate(start_numbers)[0])
-    cost, gradient, curvature, size = evaluate(numbers)
+    looks = [(evaluate(np.array(start)), start) for start in starts]
+    (cost, gradient, curvature, size), start = min(looks, key=lambda look: look[0][0])
+    numbers: FloatArray = np.array(start)
     damping = 1e-3
     for _ in range(ROUNDS):
         step = np.linalg.lstsq(curvature + damping * np.diag(curvature.diagonal()), gradient)[0]
