@@ -296,7 +296,7 @@ def _ordinary(table: Table) -> None:
 
 
 def _looped(table: Table) -> None:
-    """Four wheels behind a loop of 100 Hz, logged at 33 Hz: set speeds, speeds and currents, a file as `init` writes it."""
+    """Four wheels behind a loop of 100 Hz, logged at 33 Hz: set speeds, speeds, currents; a file of `init`."""
     case = dataclasses.replace(next(case for case in cases() if case.name == "firmware"), seconds=40.0)
     held, largest, stopped, cost = [], 0.0, 0, 0.0
     with tempfile.TemporaryDirectory() as folder:

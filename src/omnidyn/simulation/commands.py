@@ -169,7 +169,7 @@ def row_edges(dt: FloatArray) -> FloatArray:
 
 
 def phase(robot: Robot, now: float) -> float:
-    """How long ago the last tick of a speed loop was [s], at a time after any of its ticks: no rounding errors add up."""
+    """How long ago a speed loop last ticked [s], `now` after any of its ticks: no rounding errors add up."""
     period = 1.0 / (robot.drive.rate or np.inf)
     return now - math.floor(now / period + SAME_TIME) * period
 

@@ -109,8 +109,8 @@ class ExactInductance(_PaperLaw):
 
 
 class Stepped(NamedTuple):
-    """A state of an engine that solves steps, `motion` being its own. now [s]: since the last tick; asked [V], total [V]:
-    the voltages and the integrals of the speed loop, shape (wheels,); count: what the solver met."""
+    """A state of an engine that solves steps, `motion` being its own. now [s]: since the last tick of the speed loop;
+    asked [V], total [V]: its voltages and its integrals, shape (wheels,); count: what the solver met."""
 
     motion: Any
     pose: FloatArray

@@ -66,8 +66,8 @@ SENTENCES = {
     "live_restarts": Sentence("time began anew {restarts} times: what followed counts on"),
     "live_gap": Sentence("rows are missing for up to {gap:.1f} s: the motion in them is not used"),
     "live_used_until": Sentence(
-        "nothing after the gap at {at:.1f} s is used: the voltages of a speed loop are not logged, and it remembers what "
-        "happened in the gap",
+        "nothing after the gap at {at:.1f} s is used: the voltages of a speed loop are not logged, and it remembers "
+        "what happened in the gap",
         "let the robot rest, and begin a new log",
     ),
 }

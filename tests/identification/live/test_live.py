@@ -329,7 +329,7 @@ def looped_robot():
 
 
 def test_a_speed_loop_is_followed_through_its_set_speeds():
-    """Friction 1.5 times and gains half of the truth at first: all are found, and the end is the fit of the whole log."""
+    """Friction 1.5 times and gains half of the truth at first: all are found; the end is the fit of the whole log."""
     robot, log = looped_robot()
     start = Key.parse("drive.kp_V_s_rad").set(Key.parse("drive.ki_V_rad").set(robot, 0.5), 0.125)
     for axis, truth in enumerate(ROBOT.friction.axes.coulomb):

@@ -105,14 +105,14 @@ class LiveModel:
 
     @property
     def has_loop(self) -> bool:
-        """Whether the voltage is that of a speed loop: what it remembers is known from the start of the log on only."""
+        """Whether a speed loop makes the voltage: what it remembers is known from the start of the log on only."""
         return self._engine.has_loop
 
     def take(self, rows: Rows, end: float) -> None:
         """Take the rows from the start of the open stretch to a time [s], and settle.
 
-        Through a speed loop they only judge: a current jumps at each tick, so that the slope of a latency leads nowhere,
-        and the numbers move by steps that simulate the whole log.
+        Through a speed loop they only judge: a current jumps at each tick, so that the slope of a latency leads
+        nowhere, and the numbers move by steps that simulate the whole log.
         """
         self.open = self.told_by(rows, self.start, end)
         if not self.has_loop:
@@ -231,7 +231,7 @@ class LiveModel:
         return replace(self.problem, pieces=tuple(used)) if used else None
 
     def _before_a_gap(self, read: Record) -> float | None:
-        """When the first piece of a log of set speeds ends; None where it is all of it, or where voltages are logged."""
+        """When the first piece of a log of set speeds ends; None where that is all, or where voltages are logged."""
         return float(read.t[read.pieces[0][1]]) if self.has_loop and len(read.pieces) > 1 else None
 
     def _solver_of(self, problem: Problem) -> Solver[Problem]:

@@ -47,7 +47,8 @@ class LiveStatus(Displayable):
     was predicted before it counted. enough_at [s]: when all numbers that must be were known and such a stretch was
     predicted, None before, and again once a stretch is not. misfit: what the residuals of the last whole fit follow,
     nothing where the model leaves nothing out. restarts: of the clock of the log. gap [s]: the longest between two
-    rows. used_until [s]: what of it is used where a gap ends the log of a speed loop, else None. waiting: why there are no numbers yet. changes: what is no longer as in the fit before.
+    rows. used_until [s]: what of it is used where a gap ends the log of a speed loop, else None. waiting: why there are
+    no numbers yet. changes: what is no longer as in the fit before.
     """
 
     robot: str
