@@ -67,6 +67,7 @@ REASONS = {
     "unit_unknown": Reason("the unit {unit} is unknown"),
     "cells_not_numbers": Reason("cells such as {cell} are no numbers"),
     "cells_not_dates": Reason("cells such as {cell} are no numbers and no known dates"),
+    "quantity_unknown": Reason("no word and no unit says what they measure"),
     "volts_or_speeds": Reason("which may be voltages or speeds (say `column` u1={first}:V and so on)", link=""),
     "counts_per_turn_unknown": Reason("counts per turn are not known"),
     "unit_of_other": Reason(_unit_of_other),
@@ -123,7 +124,8 @@ def _looks(doubt: Doubt) -> str:
     """What columns look like, and why they are not taken."""
     reason = REASONS[doubt.code]
     looks = f"{', '.join(doubt.columns)} {by_number(doubt.columns, 'looks', 'look')} like"
-    return f"{looks} {', '.join(doubt.components)}, {reason.link}{reason.of(doubt)}"
+    kind = "columns of wheels" if doubt.stem else ", ".join(doubt.components)
+    return f"{looks} {kind}, {reason.link}{reason.of(doubt)}"
 
 
 def _doubt(reason: Reason) -> Callable[[Statement], str]:

@@ -31,6 +31,7 @@ from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
 from omnidyn.logs.columns.mapping import ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import AGAIN, BRACKETS, read_name
 from omnidyn.logs.columns.plausible import beyond_range
+from omnidyn.logs.columns.unnamed_families import unnamed_families
 from omnidyn.logs.columns.wheel_numbers import BY_PLACES, wheel_numbers
 from omnidyn.logs.columns.wheels_by_motion import proposed_wheels
 from omnidyn.logs.table.table import FileTable
@@ -75,7 +76,7 @@ def guess_columns(
     names = _without_measured_power(names)
     table = replace(table, units={**_units_of_letters(names, assumed, table.units), **table.units})
     _take_said(table, assumed, guess)
-    numbers = wheel_numbers(table, names, guess)
+    numbers = wheel_numbers(table, names, guess, assumed)
     for name in names:
         _take(table, name, numbers, assumed, robot, guess)
     _doubt_words(table, wheel_numbers(table, table.names, Guess()), guess)
@@ -104,7 +105,17 @@ def guess_columns(
             (*guess.columns, *(open_doubt.components[0] for open_doubt in guess.doubts), *(taken or {}).values()),
         )
     )
-    return ColumnMap(ordered, unused, (*joined_doubts(guess.doubts), *idle), guess.all_notes())
+    doubts = (*joined_doubts(guess.doubts), *_unnamed(table, names, guess, taken or {}), *idle)
+    return ColumnMap(ordered, unused, doubts, guess.all_notes())
+
+
+def _unnamed(table: FileTable, names: Iterable[str], guess: Guess, taken: Mapping[str, str]) -> list[Doubt]:
+    """The doubts about columns that nobody took or doubted, and whose names and units say nothing."""
+    used_names = {*(column.name for column in guess.columns.values()), *taken}
+    used_names |= {name for open_doubt in guess.doubts for name in open_doubt.columns}
+    unknown = [name for name in names if name not in used_names and not (read_name(name).unit or table.units.get(name))]
+    components = {component for open_doubt in guess.doubts for component in open_doubt.components}
+    return unnamed_families(unknown, {*guess.columns, *components, *taken.values()}, guess.robot)
 
 
 def _without_measured_power(names: list[str]) -> list[str]:
@@ -188,7 +199,7 @@ def _take(
     table_unit = table.units.get(name, "")
     unit = known_unit(assumed[name]) if name in assumed else known_unit(table_unit) if table_unit else None
     parts = read_name(name)
-    component = component_of(name, unit, numbers.get(name))
+    component = component_of(name, unit, numbers.get(name), name in assumed)
     if component is None:
         _doubt_brackets(name, numbers, guess)
         return
