@@ -184,7 +184,7 @@ def _wheels_by_places(statement: Statement) -> str:
     """Wheels called by their places."""
     n = statement.numbers
     order = ", ".join(f"{name} is wheel {wheel}" for name, wheel in zip(n["columns"], n["wheels"], strict=True))
-    return f"wheels are told by their places: {order}"
+    return f"names say where the wheels stand: {order}"
 
 
 SENTENCES = {
