@@ -223,13 +223,14 @@ def _same(a: Any, b: Any) -> bool:
 def _read_only(name: str, value: ArrayLike, kind: str | None, samples: int | None = None) -> FloatArray:
     """A read-only float64 copy of the right shape; an array that nobody can write to is not copied."""
     shape = {WHEEL: "(samples, wheels)", AXIS: "(samples, 3)"}.get(kind or "", "(samples,)")
-    if getattr(value, "dtype", np.dtype(float)).kind in "mM":
-        remedy = "write (t - t[0]) / np.timedelta64(1, 's')"
-        raise InputError("dates are no seconds", got=value.dtype, expected="seconds", remedy=remedy, where=name)
     try:
-        array = np.asarray(value, dtype=float)
+        given = np.asarray(value)
+        array = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
         raise InputError("not numbers", got=repr(value), expected=f"numbers, shape {shape}", where=name) from None
+    if given.dtype.kind in "mM":
+        remedy = "write (t - t[0]) / np.timedelta64(1, 's')"
+        raise InputError("dates are no seconds", got=given.dtype, expected="seconds", remedy=remedy, where=name)
     dimensions = 2 if kind in (WHEEL, AXIS) else 1
     bad_shape = array.ndim != dimensions or array.shape[0] == 0 or (kind == AXIS and array.shape[1] != 3)
     if bad_shape or (samples is not None and array.shape[0] != samples):

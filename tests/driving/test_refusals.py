@@ -11,9 +11,10 @@ from omnidyn.driving.program import DriveProgram
 from omnidyn.driving.recording import DriveRecording
 from omnidyn.driving.resume import rest_of
 from omnidyn.driving.simulated import SimulatedRobot
-from omnidyn.driving.wire import MeasuredLines, body, command_of, line
+from omnidyn.driving.wire import MeasuredLines, body, line
 from omnidyn.errors import InputError
 from tests.support.faulty_drives import axebot_program, with_battery
+from tests.support.wire_robot import command_of
 
 ROBOT = omnidyn.load_robot("axebot")
 ROWS = np.array([[0.0, 3.0, -3.0]] * 20 + [[0.0] * 3] * 10)

@@ -106,7 +106,7 @@ def test_dates_are_no_seconds_and_the_remedy_makes_them_such(unit):
     assert Run(t=(t - t[0]) / np.timedelta64(1, "s")).t == pytest.approx(seconds * np.array([0, 10, 30]))
 
 
-@pytest.mark.parametrize("values", [["a", "b"], [[1.0, 2.0], [1.0]], [object()] * 2, [1j, 2j]])
+@pytest.mark.parametrize("values", [["a", "b"], [[1.0, 2.0], [1.0]], [object()] * 2])
 def test_what_holds_no_numbers_is_refused(values):
     with pytest.raises(InputError, match=r"supply: not numbers; got .*; expected numbers, shape"):
         Run(t=[0.0, 1.0], supply=values)

@@ -79,7 +79,9 @@ SENTENCES = {
         "{count} rows at the end all repeat one row, at an earlier time: the recorder filled its buffer up",
         "they are left out; cut them off",
     ),
-    "time_back": Sentence("time goes back {count} times, by up to {farthest_s:.4g} s", SPLIT, {"often": COARSE_CLOCK}),
+    "time_back": Sentence(
+        "time goes back {count} {count:time|times}, by up to {farthest_s:.4g} s", SPLIT, {"often": COARSE_CLOCK}
+    ),
     "time_repeats": Sentence(
         _time_repeats, "only the first of them is used", {"often": "only the first of them is used; log a finer clock"}
     ),

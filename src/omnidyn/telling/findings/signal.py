@@ -195,9 +195,9 @@ SENTENCES = {
         "drive with a higher voltage; such a log bounds friction from below and says nothing else",
     ),
     "blocked": Sentence(
-        "for {seconds:~.3g} s the robot stands although it is driven hard enough to move: it was held, stood "
-        "against something, or its friction is far above that of the robot file",
-        "leave those rows out",
+        "for {seconds:~.3g} s the robot stands still although it is driven hard enough to move: something held it, "
+        "or its friction is far above that of the robot file",
+        "if something held it, delete these rows from the file; if nothing did, keep them: they tell its friction",
     ),
     "droop": Sentence(_droop, "fit friction against measured speed, not against the commanded one"),
     "start_up": Sentence(
