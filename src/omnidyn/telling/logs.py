@@ -69,6 +69,7 @@ REASONS = {
     "cells_not_dates": Reason("cells such as {cell} are no numbers and no known dates"),
     "quantity_unknown": Reason("no word and no unit says what they measure"),
     "volts_or_speeds": Reason("which may be voltages or speeds (say `column` u1={first}:V and so on)", link=""),
+    "volts_or_speeds_of_places": Reason("which may be voltages or speeds (say `assume` {first}=V and so on)", link=""),
     "counts_per_turn_unknown": Reason("counts per turn are not known"),
     "unit_of_other": Reason(_unit_of_other),
     "rim_without_robot": Reason(
@@ -105,7 +106,7 @@ REASONS = {
         "{least:.4g} to {largest:.4g} look like widths of servo pulses: log (width - 1500) / 500, a duty"
     ),
     "command_without_unit": Reason(_command_without_unit),
-    "clock_unit_unknown": Reason("its name and unit do not say how long one count is"),
+    "clock_unit_unknown": Reason("its name does not say that it is a time, nor in which unit"),
     "time_without_unit": Reason("no unit is given and rows are {step:.4g} apart"),
     "more_currents": Reason("there are {currents} beside {motors} motors (say `column` i1={first} and so on)"),
     "no_number": Reason("no message holds a number for it"),
@@ -173,13 +174,6 @@ def _time_unclear(statement: Statement) -> str:
     return _looks(statement.numbers["doubt"])
 
 
-def _taken_as_volts(statement: Statement) -> str:
-    """A command without a unit that can only be volts."""
-    n = statement.numbers
-    why = f" (at most {n['largest']:.3g})" if "largest" in n else ", as its name says"
-    return f"{n['column']} has no unit: taken as V{why}"
-
-
 def _wheels_by_places(statement: Statement) -> str:
     """Wheels called by their places."""
     n = statement.numbers
@@ -201,8 +195,9 @@ SENTENCES = {
     ),
     "time_unclear": Sentence(_time_unclear),
     "taken_as_si": Sentence("no unit is given for {columns:,}: taken as SI ({units:,})"),
-    "taken_as_duty": Sentence("{column} has no unit: taken as duty, -1..1"),
-    "taken_as_volts": Sentence(_taken_as_volts),
+    "taken_as_duty": Sentence("no unit is given for {columns:,}: taken as duty, -1..1"),
+    "taken_as_volts": Sentence("no unit is given for {columns:,}: taken as V, as the name says"),
+    "taken_as_volts_by_size": Sentence("no unit is given for {columns:,}: taken as V (at most {largest:.3g})"),
     "time_unit_taken": Sentence("{column} has no unit: taken as {unit}, rows are {step_s:.4g} s apart"),
     "dates": Sentence("{column} holds dates: time begins at 0 with the first"),
     "speeds_of_rims": Sentence(

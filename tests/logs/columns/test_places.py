@@ -115,5 +115,13 @@ def test_commands_currents_and_voltages_of_places_go_with_their_speeds():
     assert len(found) == 12
 
 
+def test_volts_or_speeds_of_places_are_asked_about_and_the_answer_is_taken():
+    names = [f"{place}_v" for place in SIX]
+    (doubt,) = said(guess_columns(table(*names)).doubts)
+    assert "which may be voltages or speeds (say `assume` rr_v=V and so on): not taken" in doubt
+    columns = guess_columns(table(*names), assume=dict.fromkeys(names, "V")).columns
+    assert [columns[f"u{k}"].name for k in (1, 2, 3, 4)] == ["fl_v", "fr_v", "rl_v", "rr_v"]
+
+
 def test_numbers_come_before_places():
     assert mapped("front_w1_rad_s", "front_w2_rad_s", "rear_w3_rad_s")["w3"] == "rear_w3_rad_s"

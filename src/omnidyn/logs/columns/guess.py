@@ -239,16 +239,17 @@ def _doubt_brackets(name: str, numbers: Mapping[str, int], guess: Guess) -> None
 def _doubt_letters(names: list[str], guess: Guess) -> None:
     """V1, V2, ..: volts, or speeds of the rims? Nobody knows."""
     parts = {name: read_name(name) for name in names}
-    voltage_names = [
-        name
-        for name, read in parts.items()
-        if read.number is not None and read.unit is None and read.roles == {words.LINEAR}
-    ]
-    if voltage_names and "u1" not in guess.columns:
-        guess.doubts += [
-            doubt(name, f"u{parts[name].number}", "volts_or_speeds", (), first=voltage_names[0])
-            for name in voltage_names
+    for code, marked in (("volts_or_speeds", "number"), ("volts_or_speeds_of_places", "place")):
+        voltage_names = [
+            name
+            for name, read in parts.items()
+            if getattr(read, marked) is not None and read.unit is None and read.roles == {words.LINEAR}
         ]
+        if voltage_names and "u1" not in guess.columns:
+            guess.doubts += [
+                doubt(name, f"u{parts[name].number or k}", code, (), first=voltage_names[0])
+                for k, name in enumerate(voltage_names, 1)
+            ]
 
 
 def _enter(table: FileTable, name: str, component: str, unit: Unit, is_declared: bool, guess: Guess) -> None:
