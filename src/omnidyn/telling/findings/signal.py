@@ -134,8 +134,8 @@ SENTENCES = {
         "leave those cells blank",
     ),
     "missing": Sentence(
-        "{share:%.3g} % of {subject} is missing",
-        "rows without it are not used where it is needed",
+        "{share:%.3g} % of {subject!w} {subject:is|are} missing",
+        "rows without {subject:it|them} are not used where {subject:it is|they are} needed",
     ),
     "quantised": Sentence(_quantised, "average over longer windows; a sample alone says little"),
     "reads_zero": Sentence(
