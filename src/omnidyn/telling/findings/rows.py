@@ -96,7 +96,8 @@ SENTENCES = {
         "the times as logged are used, not a fixed rate",
     ),
     "few_rows": Sentence(
-        "{rows:.0f} rows with a time: too few to judge noise, wiring or scale from", "log longer, 10 s or more"
+        "{rows:.0f} {rows:row|rows} with a time: too few to judge noise, wiring or scale from",
+        "log longer, 10 s or more",
     ),
     "clock_restart": Sentence(
         "the time begins again in line {line}, at {behind_s:.6g} s after {before_s:.6g} s: a recording of its own "
