@@ -141,7 +141,8 @@ def from_validation(error: ValidationError, model: type[BaseModel]) -> InputErro
         return InputError(first["msg"].removeprefix("Value error, ") + remark, where=location)
     expected, got, remedy = first["msg"].removeprefix("Input should be "), first["input"], ""
     if kind in _LENGTHS:
-        expected = f"{_LENGTHS[kind]} {first['ctx'].get('min_length', first['ctx'].get('max_length'))} values"
+        bounds = first.get("ctx", {})
+        expected = f"{_LENGTHS[kind]} {bounds.get('min_length', bounds.get('max_length'))} values"
     elif kind == "tuple_type":
         expected = "a list"
     elif kind == "float_type" and isinstance(got, str):
