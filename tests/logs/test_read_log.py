@@ -341,3 +341,10 @@ def test_two_logs_in_one_file_are_no_full_counter_but_lie_apart(tmp_path):
     run = read_log(write(tmp_path, "t_ms,w1_rad_s\n" + "".join(f"{each},1\n" for each in t)))
     np.testing.assert_allclose(run.t[[49, 50, 99]], [0.49, 1.49, 1.98])
     assert any("the time begins again in line 52, at 0 s after 0.49 s" in words for words in said(run.warnings))
+
+
+@pytest.mark.parametrize(("option", "value"), [("assume", "d=duty/255"), ("assume", ["d=%"]), ("latency", 0.02)])
+def test_options_that_are_dictionaries_say_so(tmp_path, option, value):
+    path = write(tmp_path, "t_s,vx_m_s\n0,1\n0.1,1\n0.2,1\n")
+    with pytest.raises(InputError, match=rf"{option}: not a dictionary; got .*; expected one such as {{'"):
+        read_log(path, **{option: value})

@@ -240,7 +240,7 @@ def test_a_hexadecimal_schema_of_5000_digits():
 
 
 def test_places_where_there_is_no_robot(tmp_path, monkeypatch):
-    with pytest.raises(InputError, match=r"no such robot; got axbot; expected .*axebot"):
+    with pytest.raises(InputError, match=r"no such robot; got axbot; expected .*axebot.*; did you mean axebot\?"):
         load_robot("axbot")
     (tmp_path / "mini.toml").write_text("", "utf-8")
     monkeypatch.chdir(tmp_path)
