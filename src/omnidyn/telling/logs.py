@@ -69,7 +69,7 @@ REASONS = {
     "cells_not_dates": Reason("cells such as {cell} are no numbers and no known dates"),
     "quantity_unknown": Reason("no word and no unit says what they measure"),
     "volts_or_speeds": Reason("which may be voltages or speeds (say `column` u1={first}:V and so on)", link=""),
-    "volts_or_speeds_of_places": Reason("which may be voltages or speeds (say `assume` {first}=V and so on)", link=""),
+    "volts_or_speeds_of_places": Reason("they may be voltages or speeds"),
     "counts_per_turn_unknown": Reason("counts per turn are not known"),
     "unit_of_other": Reason(_unit_of_other),
     "rim_without_robot": Reason(
@@ -144,6 +144,9 @@ def _doubt(reason: Reason) -> Callable[[Statement], str]:
 def _settle(statement: Statement) -> str:
     """The declaration that settles it."""
     assert isinstance(statement, Doubt)
+    if statement.stem:
+        *others, last = statement.units
+        return f"say what they are: `assume` {statement.stem}={', '.join(others)} or {last}"
     if statement.declarations:
         return f"say {' or '.join(_option(*declaration) for declaration in statement.declarations)}"
     if statement.code == "no_number":

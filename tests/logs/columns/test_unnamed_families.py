@@ -42,10 +42,22 @@ def test_any_answer_is_taken_whatever_the_word(tmp_path, stem, unit, letter, fir
     table = table_with(tmp_path, stem, numbers=numbers)
     (doubt,) = guess_columns(table).doubts
     assert [text for _, text in doubt.declarations] == [
-        f"{doubt.stem}={choice}" for choice in ("V", "duty", "rad/s", "rad")
+        f"{doubt.stem}={choice}" for choice in ("V", "duty", "rad/s", "rad", "ticks/COUNTS_PER_TURN")
     ]
     answered = guess_columns(table, assume={doubt.stem: unit})
     assert taken(answered) == {f"{letter}{k + 1}": f"{stem}{numbers[k]}" for k in range(3)}
+
+
+@pytest.mark.parametrize("form", ["motor_{}", "{} wheel", "{}_out"])
+def test_places_of_wheels_are_asked_about_too(tmp_path, form):
+    names = [form.format(place) for place in ("front_left", "front_right", "rear_left", "rear_right")]
+    table = table_of(tmp_path, {"t_s": clock(0.01), **dict.fromkeys(names, 1.5)})
+    (doubt,) = guess_columns(table).doubts
+    assert doubt.columns == tuple(names)
+    answered = guess_columns(table, assume={doubt.stem: "rad/s"})
+    assert [taken(answered)[f"w{k}"] for k in (1, 2, 3, 4)] == names
+    two = table_of(tmp_path, {"t_s": clock(0.01), **dict.fromkeys(names[:2], 1.5)}, name="two.csv")
+    assert not guess_columns(two).doubts
 
 
 def test_a_log_that_lacks_nothing_asks_nothing(tmp_path):

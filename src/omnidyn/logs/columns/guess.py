@@ -37,7 +37,7 @@ from omnidyn.logs.columns.wheels_by_motion import proposed_wheels
 from omnidyn.logs.table.table import FileTable
 from omnidyn.model.robot import Robot
 from omnidyn.sensors import BEHIND_GEAR
-from omnidyn.statement import ERROR, WARNING, Statement
+from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 from omnidyn.units import COUNT, COUNT_RATE, Unit, known_unit, parse_unit
 from omnidyn.units import DUTY as DUTY_UNIT
 from omnidyn.units import SPEED as SPEED_UNIT
@@ -51,6 +51,7 @@ _LETTER = re.compile(r"([a-z])\d{1,3}")
 
 _POWER = re.compile(r"(?!.*(?:duty|pwm|throttle)).*power.*", re.IGNORECASE | re.DOTALL)
 _BESIDE_POWER = {words.CURRENT, words.VOLTAGE, words.RATE, words.ANGLE}
+VOLTS_OR_SPEEDS = ("V", "m/s")
 NOT_OF_A_MOTOR = frozenset({words.X, words.Y, "vx", "vy", words.YAW, words.SUPPLY, words.TIME})
 
 
@@ -153,9 +154,14 @@ def _unlikely(table: FileTable, name: str, component: str, unit: str, robot: Rob
 
 
 def _meant(name: str, names: Iterable[str]) -> list[str]:
-    """The columns called so but for a number behind; the name itself where there are none, or it is a letter."""
-    numbered = [column_name for column_name in names if re.fullmatch(re.escape(name) + r"[ _]?\d+", column_name)]
-    return numbered if numbered and name not in names and not place(f"{name}1") else [name]
+    """The columns called so but for a number or a place; the name itself where there are none, or it is a letter."""
+    family = [
+        column_name
+        for column_name in names
+        if re.fullmatch(re.escape(name) + r"[ _]?\d+", column_name)
+        or ((parts := read_name(column_name)).place is not None and parts.before == name)
+    ]
+    return family if family and name not in names and not place(f"{name}1") else [name]
 
 
 def _is_used(name: str, table: FileTable, components: Iterable[str]) -> bool:
@@ -239,17 +245,17 @@ def _doubt_brackets(name: str, numbers: Mapping[str, int], guess: Guess) -> None
 def _doubt_letters(names: list[str], guess: Guess) -> None:
     """V1, V2, ..: volts, or speeds of the rims? Nobody knows."""
     parts = {name: read_name(name) for name in names}
-    for code, marked in (("volts_or_speeds", "number"), ("volts_or_speeds_of_places", "place")):
-        voltage_names = [
-            name
-            for name, read in parts.items()
-            if getattr(read, marked) is not None and read.unit is None and read.roles == {words.LINEAR}
-        ]
-        if voltage_names and "u1" not in guess.columns:
-            guess.doubts += [
-                doubt(name, f"u{parts[name].number or k}", code, (), first=voltage_names[0])
-                for k, name in enumerate(voltage_names, 1)
-            ]
+    unclear = {name: read for name, read in parts.items() if read.unit is None and read.roles == {words.LINEAR}}
+    if "u1" in guess.columns:
+        return
+    numbered = {name: read.number for name, read in unclear.items() if read.number is not None}
+    for name, number in numbered.items():
+        guess.doubts.append(doubt(name, f"u{number}", "volts_or_speeds", (), first=next(iter(numbered))))
+    for name, read in unclear.items():
+        if read.place is not None:
+            guess.doubts.append(
+                Doubt("volts_or_speeds_of_places", NOTE, "", {}, "", (name,), ("u1",), VOLTS_OR_SPEEDS, read.before)
+            )
 
 
 def _enter(table: FileTable, name: str, component: str, unit: Unit, is_declared: bool, guess: Guess) -> None:

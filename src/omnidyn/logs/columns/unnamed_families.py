@@ -1,4 +1,4 @@
-"""Ask about columns that are numbered as wheels are, in1 in2 in3, and whose names do not say what they measure."""
+"""Ask about columns of wheels, in1 in2 in3 or motor_front_left .., whose names do not say what they measure."""
 
 from __future__ import annotations
 
@@ -7,40 +7,43 @@ from collections.abc import Collection, Sequence
 
 from omnidyn.logs.channels import place
 from omnidyn.logs.columns.doubts import Doubt
-from omnidyn.logs.columns.names import says_no_quantity
+from omnidyn.logs.columns.names import read_name, says_no_quantity
+from omnidyn.logs.columns.wheel_places import wheels_at
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import MAX_WHEELS, MIN_WHEELS
 from omnidyn.statement import NOTE
 
 # What a log needs: the components that serve, and units in which wheels may have it.
 _DRIVE = re.compile(r"[ud]\d+|w\d+_cmd|vx_cmd"), ("V", "duty")
-_MOTION = re.compile(r"[wa]\d+|vx|x"), ("rad/s", "rad")
+_MOTION = re.compile(r"[wa]\d+|vx|x"), ("rad/s", "rad", "ticks/COUNTS_PER_TURN")
 
 
 def unnamed_families(names: Sequence[str], components: Collection[str], robot: Robot | None = None) -> list[Doubt]:
     """A doubt for each family of columns that may be what a log lacks: what drives its motors, or how they turn.
 
     names: of the columns that nobody took and no doubt names, without a unit. components: those that are taken, or that
-    a doubt is about. A family counts from 0 or 1, to the wheels of the robot where there is one.
+    a doubt is about. A family counts from 0 or 1, or has a place for each wheel; of a robot, for each of its wheels.
     """
     units: tuple[str, ...] = ()
     for served_by, choices in (_DRIVE, _MOTION):
         if not any(served_by.fullmatch(component) for component in components):
             units += choices
-    families: dict[str, dict[int, str]] = {}
-    for name in names if units else ():
-        match = re.fullmatch(r"(.*?)[ _]?(\d{1,2})", name, re.DOTALL)
-        if match and match[1] and not place(f"{match[1]}1") and says_no_quantity(name):
-            families.setdefault(match[1], {})[int(match[2])] = name
+    families: dict[str, dict[float, str]] = {}
+    for name in filter(says_no_quantity, names if units else ()):
+        match, parts = re.fullmatch(r"(.*?)[ _]?(\d{1,2})", name, re.DOTALL), read_name(name)
+        stem, number = (match[1], int(match[2])) if match else (parts.before, parts.place)
+        if stem and number is not None and not place(f"{stem}1"):
+            families.setdefault(stem, {})[number] = name
     return [
         Doubt("quantity_unknown", NOTE, "", {}, "", tuple(family.values()), (), units, stem)
         for stem, family in families.items()
-        if _counts_wheels(family, robot)
+        if _are_wheels(family, robot)
     ]
 
 
-def _counts_wheels(numbers: Collection[int], robot: Robot | None) -> bool:
-    """Whether numbers are 1, 2, .. or 0, 1, .. to as many as a robot has wheels."""
+def _are_wheels(numbers: Collection[float], robot: Robot | None) -> bool:
+    """Whether they are as many as a robot has wheels, and 1, 2, .. or 0, 1, .. or the places of wheels."""
     count = len(numbers)
     as_many = MIN_WHEELS <= count <= MAX_WHEELS if robot is None else count == robot.wheels.count
-    return as_many and sorted(numbers) in (list(range(count)), list(range(1, count + 1)))
+    counted = sorted(numbers) in (list(range(count)), list(range(1, count + 1)))
+    return as_many and (counted or bool(wheels_at(numbers, robot)))
