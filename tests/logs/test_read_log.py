@@ -253,9 +253,9 @@ def test_a_log_without_a_clock_is_refused_with_a_remedy(tmp_path):
 
 
 def test_why_a_time_cannot_be_told_is_whole_and_a_name_that_is_nearly_right_is_known(tmp_path):
-    """The reason ended in "say how long one...": its words were cut in the middle."""
+    """The reason ended in "...": its words were cut in the middle."""
     path = write(tmp_path, "timestep (8Hz),voltage (V),velocity (turns/s)\n0,1,2\n8,2,3\n16,2,3\n")
-    with pytest.raises(InputError, match="its name and unit do not say how long one") as caught:
+    with pytest.raises(InputError, match="neither its name nor a unit says that it is a time") as caught:
         read_log(path)
     assert "..." not in str(caught.value).partition("`column`")[0]
     with pytest.raises(InputError, match=r'no column timestep for t; .*; did you mean "timestep \(8Hz\)"\?'):

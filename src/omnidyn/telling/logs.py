@@ -106,7 +106,7 @@ REASONS = {
         "{least:.4g} to {largest:.4g} look like widths of servo pulses: log (width - 1500) / 500, a duty"
     ),
     "command_without_unit": Reason(_command_without_unit),
-    "clock_unit_unknown": Reason("its name does not say that it is a time, nor in which unit"),
+    "clock_unit_unknown": Reason("neither its name nor a unit says that it is a time"),
     "time_without_unit": Reason("no unit is given and rows are {step:.4g} apart"),
     "more_currents": Reason("there are {currents} beside {motors} motors (say `column` i1={first} and so on)"),
     "no_number": Reason("no message holds a number for it"),

@@ -157,7 +157,7 @@ def test_slow_rows_are_asked_about_as_a_finding(tmp_path, capsys, name):
     assert main(["check", str(path), "--column", f"t=time:{unit}"]) == 0
 
 
-@pytest.mark.parametrize(("step", "units"), [(0.01, ("s",)), (10.0, ("s", "ms")), (2e7, ("ns",))])
+@pytest.mark.parametrize(("step", "units"), [(0.01, ("s",)), (10.0, ("s", "ms")), (2e7, ("ns",)), (1.0, ("UNIT",))])
 def test_a_column_that_may_be_the_time_by_its_values_is_asked_about_in_the_units_that_it_may_have(
     tmp_path, step, units
 ):

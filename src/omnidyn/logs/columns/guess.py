@@ -31,13 +31,13 @@ from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
 from omnidyn.logs.columns.mapping import ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import AGAIN, BRACKETS, read_name
 from omnidyn.logs.columns.plausible import beyond_range
-from omnidyn.logs.columns.unnamed_families import unnamed_families
+from omnidyn.logs.columns.unnamed_families import unnamed_families, volts_or_speeds
 from omnidyn.logs.columns.wheel_numbers import BY_PLACES, wheel_numbers
 from omnidyn.logs.columns.wheels_by_motion import proposed_wheels
 from omnidyn.logs.table.table import FileTable
 from omnidyn.model.robot import Robot
 from omnidyn.sensors import BEHIND_GEAR
-from omnidyn.statement import ERROR, NOTE, WARNING, Statement
+from omnidyn.statement import ERROR, WARNING, Statement
 from omnidyn.units import COUNT, COUNT_RATE, Unit, known_unit, parse_unit
 from omnidyn.units import DUTY as DUTY_UNIT
 from omnidyn.units import SPEED as SPEED_UNIT
@@ -51,7 +51,6 @@ _LETTER = re.compile(r"([a-z])\d{1,3}")
 
 _POWER = re.compile(r"(?!.*(?:duty|pwm|throttle)).*power.*", re.IGNORECASE | re.DOTALL)
 _BESIDE_POWER = {words.CURRENT, words.VOLTAGE, words.RATE, words.ANGLE}
-VOLTS_OR_SPEEDS = ("V", "m/s")
 NOT_OF_A_MOTOR = frozenset({words.X, words.Y, "vx", "vy", words.YAW, words.SUPPLY, words.TIME})
 
 
@@ -81,7 +80,8 @@ def guess_columns(
     for name in names:
         _take(table, name, numbers, assumed, robot, guess)
     _doubt_words(table, wheel_numbers(table, table.names, Guess()), guess)
-    _doubt_letters(names, guess)
+    if "u1" not in guess.columns:
+        guess.doubts += volts_or_speeds(names)
     if TIME not in guess.columns:
         take_time(table, assumed, guess)
     if set(numbers.values()) <= {1} and not any(
@@ -240,22 +240,6 @@ def _doubt_brackets(name: str, numbers: Mapping[str, int], guess: Guess) -> None
     component = component_of_parts(read_name(match[1]), None, numbers.get(name)) if match else None
     if match and component is not None:
         guess.doubts.append(doubt(name, component, "unit_unknown", unit=match[2]))
-
-
-def _doubt_letters(names: list[str], guess: Guess) -> None:
-    """V1, V2, ..: volts, or speeds of the rims? Nobody knows."""
-    parts = {name: read_name(name) for name in names}
-    unclear = {name: read for name, read in parts.items() if read.unit is None and read.roles == {words.LINEAR}}
-    if "u1" in guess.columns:
-        return
-    numbered = {name: read.number for name, read in unclear.items() if read.number is not None}
-    for name, number in numbered.items():
-        guess.doubts.append(doubt(name, f"u{number}", "volts_or_speeds", (), first=next(iter(numbered))))
-    for name, read in unclear.items():
-        if read.place is not None:
-            guess.doubts.append(
-                Doubt("volts_or_speeds_of_places", NOTE, "", {}, "", (name,), ("u1",), VOLTS_OR_SPEEDS, read.before)
-            )
 
 
 def _enter(table: FileTable, name: str, component: str, unit: Unit, is_declared: bool, guess: Guess) -> None:

@@ -59,7 +59,8 @@ def take_time(table: FileTable, assumed: Mapping[str, str], guess: Guess) -> Non
     if not candidates:
         increasing = [name for name in table.names if _increases(table.columns[name])]
         if increasing:
-            texts = tuple(unit.text for unit in _possible_units(floats(table.columns[increasing[0]]))[1])
+            step, units = _possible_units(floats(table.columns[increasing[0]]))
+            texts = tuple(unit.text for unit in units) if step != 1.0 else UNIT  # one by one: rows that are counted
             guess.doubts.append(doubt(increasing[0], TIME, "clock_unit_unknown", texts or UNIT))
         return
     name = candidates[0]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from omnidyn.logs.channels import place
-from omnidyn.logs.columns.doubts import Doubt
+from omnidyn.logs.columns import names as words
+from omnidyn.logs.columns.doubts import Doubt, doubt
 from omnidyn.logs.columns.names import read_name, says_no_quantity
 from omnidyn.logs.columns.wheel_places import wheels_at
 from omnidyn.model.robot import Robot
@@ -47,3 +48,19 @@ def _are_wheels(numbers: Collection[float], robot: Robot | None) -> bool:
     as_many = MIN_WHEELS <= count <= MAX_WHEELS if robot is None else count == robot.wheels.count
     counted = sorted(numbers) in (list(range(count)), list(range(1, count + 1)))
     return as_many and (counted or bool(wheels_at(numbers, robot)))
+
+
+def volts_or_speeds(names: Iterable[str]) -> list[Doubt]:
+    """A doubt for each of V1, V2, .. or fl_v, ..: volts, or speeds of the rims? Nobody knows."""
+    parts = {name: read_name(name) for name in names}
+    unclear = {name: read for name, read in parts.items() if read.unit is None and read.roles == {words.LINEAR}}
+    numbered = {name: read.number for name, read in unclear.items() if read.number is not None}
+    doubts = [
+        doubt(name, f"u{number}", "volts_or_speeds", (), first=next(iter(numbered)))
+        for name, number in numbered.items()
+    ]
+    return doubts + [
+        Doubt("volts_or_speeds_of_places", NOTE, "", {}, "", (name,), ("u1",), ("V", "m/s"), read.before)
+        for name, read in unclear.items()
+        if read.place is not None
+    ]
