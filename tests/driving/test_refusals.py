@@ -104,6 +104,18 @@ def test_a_supply_that_was_never_a_number_is_recorded():
     assert np.isnan(np.asarray(run.supply)).all()
 
 
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 1e300])
+def test_a_number_that_no_sensor_gives_is_missing_and_costs_no_log(value):
+    recording = DriveRecording(3)
+    for k in range(3):
+        speeds = np.array([1.0, value if k == 1 else 2.0, 3.0])
+        recording.measured(0.1 * k, Measured(0.1 * k, 1, k, {"wheel_speed": speeds}))
+        recording.sent(0.1 * k, Command(1, k, 0.1 * k, 0.1, (0.1, 0.1, 0.1)))
+    run = recording.run("duty", "test")
+    assert run is not None
+    assert np.isnan(run.wheel_speed).tolist() == [[False] * 3, [False, True, False], [False] * 3]
+
+
 @pytest.mark.parametrize("micros", ["9" * 400, "-5", str(2**32)])
 def test_a_time_beyond_32_bits_is_no_line(micros):
     assert MeasuredLines(3).of(body(line(f"M,{micros},1,1,a1_rad=0"))) is None
