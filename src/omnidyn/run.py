@@ -22,6 +22,8 @@ from omnidyn.statement import Statement, statements
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+LARGEST_SIZE = 1e20  # of a number of a log: counters of 64 bits go to 2e19
+
 
 @dataclass(frozen=True, eq=False)
 class Run(Displayable):
@@ -39,7 +41,7 @@ class Run(Displayable):
     Sensors with clocks of their own keep their times: t holds the stamps of all, and a channel is NaN where its sensor
     gave nothing. Nothing is interpolated.
     Inputs (voltage, duty, commands) of row k hold over [t_k, t_k+1). All arrays are read-only.
-    Raises InputError when a channel has another shape or time does not increase.
+    Raises InputError when a channel has another shape, time does not increase, or a number is beyond LARGEST_SIZE.
     """
 
     t: FloatArray
@@ -220,13 +222,28 @@ def _same(a: Any, b: Any) -> bool:
 
 def _read_only(name: str, value: ArrayLike, kind: str | None, samples: int | None = None) -> FloatArray:
     """A read-only float64 copy of the right shape; an array that nobody can write to is not copied."""
-    array = np.asarray(value, dtype=float)
+    shape = {WHEEL: "(samples, wheels)", AXIS: "(samples, 3)"}.get(kind or "", "(samples,)")
+    try:
+        given = np.asarray(value)
+        array = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError("not numbers", got=repr(value), expected=f"numbers, shape {shape}", where=name) from None
+    if given.dtype.kind in "mM":
+        remedy = "write (t - t[0]) / np.timedelta64(1, 's')"
+        raise InputError("dates are no seconds", got=given.dtype, expected="seconds", remedy=remedy, where=name)
     dimensions = 2 if kind in (WHEEL, AXIS) else 1
     bad_shape = array.ndim != dimensions or array.shape[0] == 0 or (kind == AXIS and array.shape[1] != 3)
     if bad_shape or (samples is not None and array.shape[0] != samples):
-        shape = {WHEEL: "(samples, wheels)", AXIS: "(samples, 3)"}.get(kind or "", "(samples,)")
         length = f" with {samples} samples" if samples is not None else ""
         raise InputError("wrong shape", got=array.shape, expected=shape + length, where=name)
+    if (size := np.abs(array)).max(initial=0.0, where=~np.isnan(size)) > LARGEST_SIZE:
+        place = np.unravel_index(np.nanargmax(size), array.shape)
+        raise InputError(
+            "no sensor gives such a number",
+            got=f"{array[place]:.4g} in row {place[0]}",
+            expected=f"at most {LARGEST_SIZE:g} in size, or NaN where a value is missing",
+            where=name,
+        )
     if array.flags.writeable or array.base is not None:
         array = array.copy()
         array.flags.writeable = False

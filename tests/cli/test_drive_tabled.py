@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.driving.wire import body, command_of, line
+from omnidyn.driving.wire import body, line
+from tests.support.wire_robot import command_of
 from tests.support.worn_lekiwi import ROWS, corrected, program, table_of
 
 

@@ -11,9 +11,10 @@ from omnidyn.driving.program import DriveProgram
 from omnidyn.driving.recording import DriveRecording
 from omnidyn.driving.resume import rest_of
 from omnidyn.driving.simulated import SimulatedRobot
-from omnidyn.driving.wire import MeasuredLines, body, command_of, line
+from omnidyn.driving.wire import MeasuredLines, body, line
 from omnidyn.errors import InputError
 from tests.support.faulty_drives import axebot_program, with_battery
+from tests.support.wire_robot import command_of
 
 ROBOT = omnidyn.load_robot("axebot")
 ROWS = np.array([[0.0, 3.0, -3.0]] * 20 + [[0.0] * 3] * 10)
@@ -101,6 +102,18 @@ def test_a_supply_that_was_never_a_number_is_recorded():
     run = recording.run("duty", "test")
     assert run is not None
     assert np.isnan(np.asarray(run.supply)).all()
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 1e300])
+def test_a_number_that_no_sensor_gives_is_missing_and_costs_no_log(value):
+    recording = DriveRecording(3)
+    for k in range(3):
+        speeds = np.array([1.0, value if k == 1 else 2.0, 3.0])
+        recording.measured(0.1 * k, Measured(0.1 * k, 1, k, {"wheel_speed": speeds}))
+        recording.sent(0.1 * k, Command(1, k, 0.1 * k, 0.1, (0.1, 0.1, 0.1)))
+    run = recording.run("duty", "test")
+    assert run is not None
+    assert np.isnan(run.wheel_speed).tolist() == [[False] * 3, [False, True, False], [False] * 3]
 
 
 @pytest.mark.parametrize("micros", ["9" * 400, "-5", str(2**32)])

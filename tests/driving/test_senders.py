@@ -21,9 +21,10 @@ from omnidyn.driving.connection import Command, Measured
 from omnidyn.driving.drive import drive
 from omnidyn.driving.senders import sender
 from omnidyn.driving.simulated import SimulatedRobot
-from omnidyn.driving.wire import Lines, MeasuredLines, body, command_line, command_of, line, measured_line, stop_line
+from omnidyn.driving.wire import Lines, MeasuredLines, body, command_line, line, stop_line
 from omnidyn.errors import InputError, MissingExtraError
 from tests.support.faulty_drives import DT, axebot_program
+from tests.support.wire_robot import command_of, measured_line
 
 PROGRAM = axebot_program()
 COMMAND = Command(7, 3, 1.25, 0.125, (1.5, -2.25, 0.0))

@@ -30,6 +30,18 @@ def test_time_that_goes_back_is_fatal_with_its_lines():
     assert finding.numbers["farthest_s"] == pytest.approx(0.49)
 
 
+@pytest.mark.parametrize(("rows", "times", "often"), [(30, 1, False), (120, 2, False), (120, 3, True), (700, 3, False)])
+def test_a_time_that_goes_back_once_or_twice_is_not_often_however_short_the_log(rows, times, often):
+    t = np.arange(rows) * 0.01
+    for k in range(times):
+        t[(k + 1) * rows // (times + 1) :] -= 0.05
+    log = ticking(t + 100.0)
+    (finding,) = check(log).of("time_back")
+    assert finding.count == times
+    assert ("finer clock" in finding.remedy_text or "do not sort" in finding.remedy_text) == often
+    assert len(log.recordings()) == (1 if often else times + 1)
+
+
 @pytest.mark.parametrize("lost", [3, 4, 50])
 def test_a_gap_of_three_rows_or_more_is_found_where_it_is(lost):
     t = np.delete(np.arange(400) * 0.01, range(200, 200 + lost))

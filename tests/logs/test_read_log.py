@@ -253,9 +253,9 @@ def test_a_log_without_a_clock_is_refused_with_a_remedy(tmp_path):
 
 
 def test_why_a_time_cannot_be_told_is_whole_and_a_name_that_is_nearly_right_is_known(tmp_path):
-    """The reason ended in "say how long one...": its words were cut in the middle."""
+    """The reason ended in "...": its words were cut in the middle."""
     path = write(tmp_path, "timestep (8Hz),voltage (V),velocity (turns/s)\n0,1,2\n8,2,3\n16,2,3\n")
-    with pytest.raises(InputError, match="its name and unit do not say how long one") as caught:
+    with pytest.raises(InputError, match="neither its name nor a unit says that it is a time") as caught:
         read_log(path)
     assert "..." not in str(caught.value).partition("`column`")[0]
     with pytest.raises(InputError, match=r'no column timestep for t; .*; did you mean "timestep \(8Hz\)"\?'):
@@ -341,3 +341,10 @@ def test_two_logs_in_one_file_are_no_full_counter_but_lie_apart(tmp_path):
     run = read_log(write(tmp_path, "t_ms,w1_rad_s\n" + "".join(f"{each},1\n" for each in t)))
     np.testing.assert_allclose(run.t[[49, 50, 99]], [0.49, 1.49, 1.98])
     assert any("the time begins again in line 52, at 0 s after 0.49 s" in words for words in said(run.warnings))
+
+
+@pytest.mark.parametrize(("option", "value"), [("assume", "d=duty/255"), ("assume", ["d=%"]), ("latency", 0.02)])
+def test_options_that_are_dictionaries_say_so(tmp_path, option, value):
+    path = write(tmp_path, "t_s,vx_m_s\n0,1\n0.1,1\n0.2,1\n")
+    with pytest.raises(InputError, match=rf"{option}: not a dictionary; got .*; expected one such as {{'"):
+        read_log(path, **{option: value})

@@ -1,5 +1,6 @@
 """Run files: to the last bit and back, and nothing half-written."""
 
+import re
 import sys
 from dataclasses import fields
 
@@ -12,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 from omnidyn import load_robot, simulate, write_run
 from omnidyn.errors import InputError, MissingExtraError
 from omnidyn.logs.run_file import read_run, run_to_csv
-from omnidyn.run import CHANNELS, Run
+from omnidyn.run import CHANNELS, LARGEST_SIZE, Run
 
 HEADER = (
     "t_s,u1_V,u2_V,u3_V,d1_duty,d2_duty,d3_duty,i1_A,i2_A,i3_A,a1_rad,a2_rad,a3_rad,w1_rad_s,w2_rad_s,w3_rad_s,"
@@ -52,8 +53,8 @@ def test_a_simulation_reads_back_to_the_last_bit(tmp_path):
     assert bits(read_run(tmp_path / "run.csv")) == bits(run)
 
 
-@given(arrays(float, (4, 3), elements=st.floats(allow_infinity=False, allow_nan=False)))
-def test_every_finite_float_survives(tmp_path_factory, values):
+@given(arrays(float, (4, 3), elements=st.floats(-LARGEST_SIZE, LARGEST_SIZE)))
+def test_every_float_of_a_run_survives(tmp_path_factory, values):
     path = tmp_path_factory.mktemp("run") / "run.csv"
     run = Run(t=[0.0, 1e-9, 0.1, 1e12], pose=values)
     write_run(run, path)
@@ -81,11 +82,34 @@ def test_any_number_of_wheels(tmp_path, wheels):
     assert np.array_equal(read_run(tmp_path / "run.csv").current, run.current)
 
 
-def test_an_infinite_value_is_refused_with_its_place(tmp_path):
-    run = Run(t=[0.0, 1.0], pose=[[0.0, 0.0, 0.0], [0.0, np.inf, 0.0]])
-    with pytest.raises(InputError, match="row 1, column y_m: cannot write an infinite value; got inf"):
-        write_run(run, tmp_path / "run.csv")
-    assert not list(tmp_path.iterdir())
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 1e308, -1.1e20])
+def test_a_number_that_no_sensor_gives_is_refused_with_its_row(value):
+    message = f"pose: no sensor gives such a number; got {value:.4g} in row 1; expected at most 1e+20 in size, or NaN"
+    with pytest.raises(InputError, match=re.escape(message)):
+        Run(t=[0.0, 1.0], pose=[[np.nan, 0.0, 0.0], [0.0, value, np.nan]])
+    assert Run(t=[0.0], supply=[np.copysign(LARGEST_SIZE, value)]).supply[0] == np.copysign(LARGEST_SIZE, value)
+
+
+@pytest.mark.parametrize("t", [[0.0, np.inf], [-np.inf, 0.0], [0.0, 1e21]])
+def test_so_is_a_time(t):
+    with pytest.raises(InputError, match="t: no sensor gives such a number"):
+        Run(t=t)
+
+
+@pytest.mark.parametrize("unit", ["datetime64[ns]", "datetime64[s]", "timedelta64[ms]"])
+def test_dates_are_no_seconds_and_the_remedy_makes_them_such(unit):
+    t = np.array([0, 10, 30]).astype(unit)
+    remedy = "t: dates are no seconds; got .*; expected seconds; write (t - t[0]) / np.timedelta64(1, 's')"
+    with pytest.raises(InputError, match=re.escape(remedy).replace(r"\.\*", ".*")):
+        Run(t=t)
+    seconds = {"ns": 1e-9, "ms": 1e-3}.get(unit[-3:-1], 1.0)
+    assert Run(t=(t - t[0]) / np.timedelta64(1, "s")).t == pytest.approx(seconds * np.array([0, 10, 30]))
+
+
+@pytest.mark.parametrize("values", [["a", "b"], [[1.0, 2.0], [1.0]], [object()] * 2])
+def test_what_holds_no_numbers_is_refused(values):
+    with pytest.raises(InputError, match=r"supply: not numbers; got .*; expected numbers, shape"):
+        Run(t=[0.0, 1.0], supply=values)
 
 
 def test_an_existing_file_stays_unless_forced(tmp_path):
@@ -110,7 +134,7 @@ def test_parquet_reads_back_to_the_last_bit(tmp_path, name):
 
 def test_parquet_keeps_every_kind_of_float(tmp_path):
     pytest.importorskip("pyarrow")
-    odd = np.array([np.nan, -0.0, 5e-324, 1.7976931348623157e308, 0.1]).view(np.int64)
+    odd = np.array([np.nan, -0.0, 5e-324, LARGEST_SIZE, 0.1]).view(np.int64)
     odd[0] |= 7  # a NaN with a payload
     run = Run(t=np.arange(5.0), supply=odd.view(float))
     write_run(run, tmp_path / "run.parquet")

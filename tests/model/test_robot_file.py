@@ -96,7 +96,11 @@ BAD = {
     ),
     "missing key": (MASS, "", "mass_kg: a key is missing; expected mass_kg"),
     "missing table": (AXEBOT[AXEBOT.index("[motor]") : AXEBOT.index("[friction")], "", "motor: a key is missing"),
-    "string for number": (MASS, 'mass_kg = "1.5"', "mass_kg: cannot use this value; got 1.5; expected a valid number"),
+    "string for number": (
+        MASS,
+        'mass_kg = "1.5"',
+        'mass_kg: cannot use this value; got the text "1.5"; expected a valid number; write numbers without quotes',
+    ),
     "date for number": (MASS, "mass_kg = 2020-01-01", "mass_kg: cannot use this value; .*expected a valid number"),
     "NaN": (MASS, "mass_kg = nan", "mass_kg: cannot use this value; got nan; expected a finite number"),
     "bool": (MASS, "mass_kg = true", "mass_kg: cannot use this value; got True; expected a valid number"),
@@ -128,11 +132,15 @@ BAD = {
     ),
     "NaN in a list": (VISCOUS, "viscous = [0.94, nan, 0.01]", r"viscous\[1\]: cannot use .*got nan; expected a finite"),
     "breakaway below Coulomb": (VISCOUS, f"{VISCOUS}\nbreakaway = [2.2, 1.4, 0.1]", "breakaway .* is below coulomb"),
-    "2 wheels": (AZIMUTH, "[180.0, 60.0]", "azimuth_deg: cannot use .*at least 3"),
+    "2 wheels": (AZIMUTH, "[180.0, 60.0]", "azimuth_deg: cannot use this value; .*expected at least 3 values"),
     "10 000 wheels": (AZIMUTH, str([i % 360.0 for i in range(10_000)]), "azimuth_deg: cannot use .*at most 16"),
     "wheels all at one place": (AZIMUTH, "[60.0, 60.0, 60.0]", "cannot move the robot in every direction"),
     "one number for the wheels": (AZIMUTH, "180.0", "azimuth_deg: cannot use this value; got 180.0"),
-    "4 numbers for 3 axes": (VISCOUS, "viscous = [1, 2, 3, 4]", "viscous: cannot use this value; .*at most 3"),
+    "4 numbers for 3 axes": (
+        VISCOUS,
+        "viscous = [1, 2, 3, 4]",
+        "viscous: cannot use this value; .*expected at most 3 values",
+    ),
     "2 numbers for 3 axes": (VISCOUS, "viscous = [1.0, 2.0]", r"\[friction\.axes\] viscous: too few values"),
     "2 resistances for 3 motors": (
         "resistance_ohm = 1.69",
@@ -232,7 +240,7 @@ def test_a_hexadecimal_schema_of_5000_digits():
 
 
 def test_places_where_there_is_no_robot(tmp_path, monkeypatch):
-    with pytest.raises(InputError, match=r"no such robot; got axbot; expected .*axebot"):
+    with pytest.raises(InputError, match=r"no such robot; got axbot; expected .*axebot.*; did you mean axebot\?"):
         load_robot("axbot")
     (tmp_path / "mini.toml").write_text("", "utf-8")
     monkeypatch.chdir(tmp_path)

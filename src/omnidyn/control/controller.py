@@ -86,22 +86,6 @@ class Info:
         return self.status in (OK, PATH_ENDED, SWINGS, *DOUBTS.values())
 
 
-class Followed(Protocol):
-    """What a controller asks of a path; a Path (paths/motion.py) has more, and `as_path` makes one of this."""
-
-    @property
-    def end(self) -> float:
-        """Time from which on the path stands still [s]; infinite where it goes on for ever."""
-        ...
-
-    def at(self, t: Any) -> Any:
-        """(pose, velocity, acceleration) in the world frame at times t [s], shapes (*t.shape, 3): a plain tuple.
-
-        A controller asks for several times at once; where that raises, or gives other shapes, for one at a time.
-        """
-        ...
-
-
 class Controller(Protocol):
     """What every controller provides; the numbered list above says how."""
 

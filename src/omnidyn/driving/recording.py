@@ -11,7 +11,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.driving.connection import Command, Measured
 from omnidyn.errors import InputError
 from omnidyn.identification.live.rows import part
-from omnidyn.run import Run
+from omnidyn.run import LARGEST_SIZE, Run
 from omnidyn.sensors import AXIS, CHANNELS, SCALAR, WHEEL
 
 TICK = 1e-6  # [s]: times that are nearer are one row
@@ -94,10 +94,11 @@ def _ticks(times: Sequence[float]) -> np.ndarray:
 
 
 def _column(name: str, values: list[tuple[int, FloatArray]], ticks: np.ndarray) -> FloatArray:
-    """A channel on the rows of the log, NaN where it was not measured."""
+    """A channel on the rows of the log, NaN where it was not measured, or as no sensor gives it."""
     width = len(values[0][1])
     rows = np.full((len(ticks), width), np.nan)
     rows[np.searchsorted(ticks, [tick for tick, _ in values])] = [value for _, value in values]
+    rows[np.abs(rows) > LARGEST_SIZE] = np.nan
     return rows[:, 0] if CHANNELS[name] == SCALAR else rows
 
 

@@ -10,7 +10,6 @@ Times are whole numbers below 2^32, which begin again at 0 there.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from functools import reduce
 
@@ -45,37 +44,13 @@ def _check(text: str) -> str:
 def command_line(command: Command) -> bytes:
     """A command as a line."""
     inputs = ",".join(f"{value:.7g}" for value in command.inputs)
-    times = f"{_micros(command.sent)},{round(command.hold * MICROS)}"
+    times = f"{round(command.sent * MICROS) % WRAP},{round(command.hold * MICROS)}"
     return line(f"{COMMAND},{command.session},{command.number},{times},{inputs}")
 
 
 def stop_line(session: int) -> bytes:
     """Motors off, as a line."""
     return line(f"{STOP},{session}")
-
-
-def command_of(fields: list[str] | None) -> Command | None:
-    """The command in the fields of a line; None where it holds none."""
-    if fields is None or fields[0] != COMMAND or len(fields) < 6:
-        return None
-    try:
-        session, number, sent, hold = map(int, fields[1:5])
-        inputs = tuple(map(float, fields[5:]))
-    except ValueError:
-        return None
-    if not all(map(math.isfinite, inputs)) or not (0 <= sent < WRAP and 0 <= hold < WRAP):
-        return None
-    return Command(session, number, sent / MICROS, hold / MICROS, inputs)
-
-
-def measured_line(measured: Measured) -> bytes:
-    """A measurement as a line."""
-    cells = [
-        f"{name}={value:.7g}"
-        for channel, values in measured.channels.items()
-        for name, value in zip(columns_of(channel, len(values)), values.tolist(), strict=True)
-    ]
-    return line(",".join([MEASURED, str(_micros(measured.t)), str(measured.session), str(measured.number), *cells]))
 
 
 class MeasuredLines:
@@ -125,7 +100,3 @@ class Lines:
             complete += lines
             self._rest = rest[-LONGEST:]
         return complete
-
-
-def _micros(seconds: float) -> int:
-    return round(seconds * MICROS) % WRAP

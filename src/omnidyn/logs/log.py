@@ -28,6 +28,7 @@ REFUSED = {
     "rows_repeated": "repeat the time of the row before",
 }
 OFTEN_BACK = 0.005  # of the rows: no recorder writes so many out of order
+FEW_TIMES_BACK = 2  # are never often, however short the log: where recordings were joined
 MAX_MISSING = 0.2  # share of rows without a time or without any number
 ON_CHANGE = 0.2  # a component with more blank cells than this share, gaps left out, is recorded on change
 SAME_TIME_SHARE = 1e-6  # of a row: times that are no farther apart are one
@@ -93,7 +94,7 @@ class Log:
     def recordings(self) -> list[Log]:
         """The log cut where its clock or a counter begins again, and where its time goes back now and then."""
         back = np.flatnonzero(np.diff(self.t) < 0.0) + 1
-        cuts = back if back.size <= OFTEN_BACK * len(self) else back[:0]
+        cuts = back[:0] if goes_back_often(back.size, len(self)) else back
         lines = [restart.line for restart in self.restarts if restart.is_gap]
         begins = np.searchsorted(self.lines, lines).tolist()
         edges = sorted({0, *cuts.tolist(), *begins, len(self)})
@@ -288,7 +289,7 @@ class Log:
 
 def goes_back_often(times: int, rows: int) -> bool:
     """Whether time goes back so often that the clock is wrong, not the order of the rows."""
-    return times > OFTEN_BACK * rows
+    return times > max(OFTEN_BACK * rows, FEW_TIMES_BACK)
 
 
 def back_remedy(times: int, rows: int, sort: str) -> str:

@@ -135,6 +135,9 @@ def read_log(  # pyright: ignore[reportInconsistentOverload]  it has the options
     >>> run.voltage.shape, run.twist[:, 0].tolist()
     ((3, 3), [0.0, 0.06, 0.12])
     """
+    for name, given, example in (("assume", assume, {"d": "duty/255"}), ("latency", latency, {"w": 0.02})):
+        if given is not None and not isinstance(given, Mapping):
+            raise InputError("not a dictionary", got=repr(given), expected=f"one such as {example}", where=name)
     column_map = columns if isinstance(columns, ColumnMap) else None
     overrides: tuple[str, ...] = ()
     if isinstance(columns, Mapping):

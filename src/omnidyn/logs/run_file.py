@@ -13,7 +13,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping, Sequence
-from itertools import starmap
 from pathlib import Path
 from typing import Any
 
@@ -81,8 +80,8 @@ def columns_of(channel: str, wheels: int) -> list[str]:
 def write_run(run: Run, path: str | os.PathLike, force: bool = False) -> Path:
     """Write a run, whole or not at all: as its name ends: .parquet, .mcap (ROS 2), .mat, else CSV.
 
-    Raises InputError when the file exists (unless `force`) or cannot be written, or when a value is infinite, and
-    MissingExtraError for Parquet without pyarrow, for MCAP without mcap.
+    Raises InputError when the file exists (unless `force`) or cannot be written, and MissingExtraError for Parquet
+    without pyarrow, for MCAP without mcap.
     """
     check_order("write_run(run, path)", (run, Run), (path, (str, os.PathLike)))
     run = as_run(run)
@@ -94,16 +93,10 @@ def write_run(run: Run, path: str | os.PathLike, force: bool = False) -> Path:
 def _content(run: Run, suffix: str) -> str | bytes:
     """The run in the format of a name that ends so."""
     if suffix == MCAP:
-        return run_to_mcap(_finite(run))
+        return run_to_mcap(run)
     if suffix == MAT:
-        return columns_to_mat(run_columns(_finite(run)))
+        return columns_to_mat(run_columns(run))
     return run_to_parquet(run) if suffix in SUFFIXES else run_to_csv(run)
-
-
-def _finite(run: Run) -> Run:
-    for name, values in run_columns(run).items():
-        _refuse_infinite(name, values)
-    return run
 
 
 def check_format(path: str | os.PathLike) -> None:
@@ -124,17 +117,15 @@ def check_format(path: str | os.PathLike) -> None:
 
 
 def run_to_parquet(run: Run) -> bytes:
-    """The run as a Parquet file. Raises InputError where a value is infinite, MissingExtraError without pyarrow."""
+    """The run as a Parquet file. Raises MissingExtraError without pyarrow."""
     columns = run_columns(run)
-    for name, values in columns.items():
-        _refuse_infinite(name, values)
     return parquet_bytes(columns, {name: unit_of_column(name) for name in columns})
 
 
 def run_to_csv(run: Run) -> str:
-    """The run as the text of a run file. Raises InputError where a value is infinite."""
+    """The run as the text of a run file."""
     columns = run_columns(run)
-    rows = zip(*starmap(_cells, columns.items()), strict=True)
+    rows = zip(*map(_cells, columns.values()), strict=True)
     return ",".join(columns) + "\n" + "\n".join(map(",".join, rows)) + "\n"
 
 
@@ -147,25 +138,9 @@ def run_columns(run: Run) -> dict[str, FloatArray]:
     return columns
 
 
-def _cells(name: str, values: FloatArray) -> list[str]:
+def _cells(values: FloatArray) -> list[str]:
     """A column as text: repr keeps every bit, NaN is an empty cell."""
-    finite = np.isfinite(values)
-    if finite.all():
-        return list(map(repr, values.tolist()))
-    _refuse_infinite(name, values)
     return ["" if value != value else repr(value) for value in values.tolist()]
-
-
-def _refuse_infinite(name: str, values: FloatArray) -> None:
-    infinite = np.flatnonzero(np.isinf(values))
-    if infinite.size:
-        row = int(infinite[0])
-        raise InputError(
-            "cannot write an infinite value",
-            got=float(values[row]),
-            expected="a finite number, or NaN where missing",
-            where=f"row {row}, column {name}",
-        )
 
 
 def read_run(path: str | os.PathLike) -> Run:

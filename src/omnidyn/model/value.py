@@ -139,8 +139,18 @@ def from_validation(error: ValidationError, model: type[BaseModel]) -> InputErro
         return InputError(f"a key is missing{remark}", expected=str(path[-1]), remedy="add it", where=location)
     if kind == "value_error":  # one of our own checks: its words are complete
         return InputError(first["msg"].removeprefix("Value error, ") + remark, where=location)
-    expected = "a list" if kind == "tuple_type" else first["msg"].removeprefix("Input should be ")
-    return InputError(f"cannot use this value{remark}", got=first["input"], expected=expected, where=location)
+    expected, got, remedy = first["msg"].removeprefix("Input should be "), first["input"], ""
+    if kind in _LENGTHS:
+        bounds = first.get("ctx", {})
+        expected = f"{_LENGTHS[kind]} {bounds.get('min_length', bounds.get('max_length'))} values"
+    elif kind == "tuple_type":
+        expected = "a list"
+    elif kind == "float_type" and isinstance(got, str):
+        got, remedy = f'the text "{got}"', "write numbers without quotes"
+    return InputError(f"cannot use this value{remark}", got=got, expected=expected, remedy=remedy, where=location)
+
+
+_LENGTHS = {"too_short": "at least", "too_long": "at most"}
 
 
 def key_path(path: list[Any] | tuple[Any, ...]) -> str:

@@ -67,7 +67,9 @@ REASONS = {
     "unit_unknown": Reason("the unit {unit} is unknown"),
     "cells_not_numbers": Reason("cells such as {cell} are no numbers"),
     "cells_not_dates": Reason("cells such as {cell} are no numbers and no known dates"),
+    "quantity_unknown": Reason("no word and no unit says what they measure"),
     "volts_or_speeds": Reason("which may be voltages or speeds (say `column` u1={first}:V and so on)", link=""),
+    "volts_or_speeds_of_places": Reason("they may be voltages or speeds"),
     "counts_per_turn_unknown": Reason("counts per turn are not known"),
     "unit_of_other": Reason(_unit_of_other),
     "rim_without_robot": Reason(
@@ -104,7 +106,7 @@ REASONS = {
         "{least:.4g} to {largest:.4g} look like widths of servo pulses: log (width - 1500) / 500, a duty"
     ),
     "command_without_unit": Reason(_command_without_unit),
-    "clock_unit_unknown": Reason("its name and unit do not say how long one count is"),
+    "clock_unit_unknown": Reason("neither its name nor a unit says that it is a time"),
     "time_without_unit": Reason("no unit is given and rows are {step:.4g} apart"),
     "more_currents": Reason("there are {currents} beside {motors} motors (say `column` i1={first} and so on)"),
     "no_number": Reason("no message holds a number for it"),
@@ -123,7 +125,8 @@ def _looks(doubt: Doubt) -> str:
     """What columns look like, and why they are not taken."""
     reason = REASONS[doubt.code]
     looks = f"{', '.join(doubt.columns)} {by_number(doubt.columns, 'looks', 'look')} like"
-    return f"{looks} {', '.join(doubt.components)}, {reason.link}{reason.of(doubt)}"
+    kind = "columns of wheels" if doubt.stem else ", ".join(doubt.components)
+    return f"{looks} {kind}, {reason.link}{reason.of(doubt)}"
 
 
 def _doubt(reason: Reason) -> Callable[[Statement], str]:
@@ -141,6 +144,9 @@ def _doubt(reason: Reason) -> Callable[[Statement], str]:
 def _settle(statement: Statement) -> str:
     """The declaration that settles it."""
     assert isinstance(statement, Doubt)
+    if statement.stem:
+        *others, last = statement.units
+        return f"say what they are: `assume` {statement.stem}={', '.join(others)} or {last}"
     if statement.declarations:
         return f"say {' or '.join(_option(*declaration) for declaration in statement.declarations)}"
     if statement.code == "no_number":
@@ -171,18 +177,11 @@ def _time_unclear(statement: Statement) -> str:
     return _looks(statement.numbers["doubt"])
 
 
-def _taken_as_volts(statement: Statement) -> str:
-    """A command without a unit that can only be volts."""
-    n = statement.numbers
-    why = f" (at most {n['largest']:.3g})" if "largest" in n else ", as its name says"
-    return f"{n['column']} has no unit: taken as V{why}"
-
-
 def _wheels_by_places(statement: Statement) -> str:
     """Wheels called by their places."""
     n = statement.numbers
     order = ", ".join(f"{name} is wheel {wheel}" for name, wheel in zip(n["columns"], n["wheels"], strict=True))
-    return f"wheels are told by their places: {order}"
+    return f"names say where the wheels stand: {order}"
 
 
 SENTENCES = {
@@ -199,8 +198,9 @@ SENTENCES = {
     ),
     "time_unclear": Sentence(_time_unclear),
     "taken_as_si": Sentence("no unit is given for {columns:,}: taken as SI ({units:,})"),
-    "taken_as_duty": Sentence("{column} has no unit: taken as duty, -1..1"),
-    "taken_as_volts": Sentence(_taken_as_volts),
+    "taken_as_duty": Sentence("no unit is given for {columns:,}: taken as duty, -1..1"),
+    "taken_as_volts": Sentence("no unit is given for {columns:,}: taken as V, as the name says"),
+    "taken_as_volts_by_size": Sentence("no unit is given for {columns:,}: taken as V (at most {largest:.3g})"),
     "time_unit_taken": Sentence("{column} has no unit: taken as {unit}, rows are {step_s:.4g} s apart"),
     "dates": Sentence("{column} holds dates: time begins at 0 with the first"),
     "speeds_of_rims": Sentence(

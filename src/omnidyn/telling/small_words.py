@@ -24,11 +24,11 @@ def names(statement: Statement) -> str:
     return all_of(statement.subject.split())
 
 
-def by_number(count: int | Sized | str, one: str, many: str) -> str:
+def by_number(count: float | Sized | str, one: str, many: str) -> str:
     """One word for one, another for several. count: a number, or names with spaces between."""
     if isinstance(count, str):
         count = len(count.split())
-    return one if (count if isinstance(count, int) else len(count)) == 1 else many
+    return one if (count if isinstance(count, int | float) else len(count)) == 1 else many
 
 
 def counted(count: int, noun: str) -> str:

@@ -116,8 +116,8 @@ def _asks(statement: Statement) -> str:
     numbers = statement.numbers
     words = (
         f"the motors draw up to {short(numbers['current'])} A together, heat the hottest winding by "
-        f"{short(numbers['heat'])} W in the mean, and a wheel pushes with up to {short(numbers['traction'])} of what "
-        "it carries"
+        f"{short(numbers['heat'])} W on average, and a wheel pushes with up to {short(numbers['traction'])} times the "
+        "weight on it"
     )
     reasons = [f"{numbers['left_out'][why]} that {LEFT_OUT[why]}" for why in LEFT_OUT if why in numbers["left_out"]]
     limits = {why: value for why, value in numbers["limits"].items() if math.isfinite(value)}

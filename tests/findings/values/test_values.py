@@ -121,6 +121,16 @@ def test_missing_values_are_counted(log, robot, with_channels):
     assert (finding.severity, finding.subject, finding.count) == ("note", "i1", 50)
 
 
+def test_components_that_miss_the_same_rows_are_one_finding(log, with_channels):
+    values = log.channels["wheel_speed"].copy()
+    values[100:150] = np.nan
+    values[300:310, 2] = np.nan
+    both, third = sorted(check(with_channels(wheel_speed=values)).of("missing"), key=lambda one: one.count)
+    assert (both.subject, both.count, third.subject, third.count) == ("w1 w2", 50, "w3", 60)
+    assert "of w1 and w2 are missing" in str(both)
+    assert "of w3 is missing" in str(third)
+
+
 def test_a_sensor_that_is_out_for_long_is_missing_and_no_other_fault(log, robot, with_channels, grave):
     """A line across 27 % of the rows was taken for a speed, and its energy for impossible."""
     values = log.channels["wheel_speed"].copy()

@@ -8,6 +8,8 @@ import pytest
 
 from omnidyn.logs.columns.guess import guess_columns
 from omnidyn.logs.columns.mapping import quantity_of
+from omnidyn.logs.columns.names import read_name
+from omnidyn.logs.columns.wheel_places import FARTHEST_ANGLE
 from omnidyn.logs.read_log import read_log
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.table.table import FileTable
@@ -94,3 +96,13 @@ def test_a_unit_in_a_name_is_read_as_the_page_says(name):
         return
     (component,) = {*columns.columns} - {"vx", "t"} or {doubt.components[0] for doubt in columns.doubts}
     assert component[0] in "wi"
+
+
+def test_a_place_in_a_name_says_the_wheel_as_the_page_says():
+    names = re.findall(r"`(\w+)`", re.search(r"A name that says a place \((.*?)\)", PAGE)[1])
+    assert names
+    assert [read_name(name).place for name in names] == [45.0] * len(names)
+    assert "four are counted front left, front right, rear left, rear right" in PAGE
+    columns = taken({f"{place}_rad_s": SWING for place in ("rr", "fr", "rl", "fl")}).columns
+    assert [columns[f"w{k}"].name[:2] for k in (1, 2, 3, 4)] == ["fl", "fr", "rl", "rr"]
+    assert f"within {FARTHEST_ANGLE:.0f} degrees" in PAGE

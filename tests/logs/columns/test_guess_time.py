@@ -155,3 +155,12 @@ def test_slow_rows_are_asked_about_as_a_finding(tmp_path, capsys, name):
     assert (finding["code"], finding["severity"]) == ("not_taken", "error")
     assert f'--column "t=time:{unit}" or --column "t=time:{other}"' in finding["remedy"].replace("`column`", "--column")
     assert main(["check", str(path), "--column", f"t=time:{unit}"]) == 0
+
+
+@pytest.mark.parametrize(("step", "units"), [(0.01, ("s",)), (10.0, ("s", "ms")), (2e7, ("ns",)), (1.0, ("UNIT",))])
+def test_a_column_that_may_be_the_time_by_its_values_is_asked_about_in_the_units_that_it_may_have(
+    tmp_path, step, units
+):
+    (doubt,) = guess_columns(table_of(tmp_path, {"c1": clock(step), "c2": 1.0})).doubts
+    assert doubt.code == "clock_unit_unknown"
+    assert doubt.declarations == tuple(("column", f"t=c1:{unit}") for unit in units)

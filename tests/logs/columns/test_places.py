@@ -115,5 +115,16 @@ def test_commands_currents_and_voltages_of_places_go_with_their_speeds():
     assert len(found) == 12
 
 
+def test_volts_or_speeds_of_places_are_asked_about_and_the_answer_is_taken():
+    names = [f"{place}_v" for place in SIX]
+    (doubt,) = guess_columns(table(*names)).doubts
+    assert "but they may be voltages or speeds: not taken" in said([doubt])[0]
+    assert doubt.remedy_text == "say what they are: `assume` v=V or m/s"
+    columns = guess_columns(table(*names), assume={"v": "V"}).columns
+    assert [columns[f"u{k}"].name for k in (1, 2, 3, 4)] == ["fl_v", "fr_v", "rl_v", "rr_v"]
+    columns = guess_columns(table(*names), load_robot("mecanum"), assume={"v": "m/s"}).columns
+    assert [columns[f"w{k}"].name for k in (1, 2, 3, 4)] == ["fl_v", "fr_v", "rl_v", "rr_v"]
+
+
 def test_numbers_come_before_places():
     assert mapped("front_w1_rad_s", "front_w2_rad_s", "rear_w3_rad_s")["w3"] == "rear_w3_rad_s"

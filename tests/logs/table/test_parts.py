@@ -274,6 +274,23 @@ def test_what_ends_every_row():
     assert found.cells("2,3", "") == ["2", "3"]
 
 
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_of_a_row_one_separator_too_many_is_its_end_and_nothing_else_is(separator):
+    found = layout("t,u\n0,1,\n1,2,".replace(",", separator))
+    assert found.ending == separator
+    for row, cells in (
+        ("2,3,", ["2", "3"]),
+        ("2,3", ["2", "3"]),
+        ("2,,", ["2", ""]),  # the last cell is blank
+        ("2,", ["2", ""]),  # and the row does not end as the others do
+        ("2,3,4", ["2", "3", "4"]),  # too many cells: refused where rows are read
+        ("2,3,,", ["2", "3", "", ""]),
+    ):
+        assert found.cells(row.replace(",", separator), "") == cells
+    plain = layout("t,u\n0,1\n1,2".replace(",", separator))
+    assert (plain.ending, plain.cells(f"2{separator}3{separator}", "")) == ("", ["2", "3", ""])
+
+
 def test_a_head_need_not_end_as_the_rows_do():
     """Names and units without the semicolon of each row: told where enough rows follow."""
     rows = "".join(f"\n{k},{2 * k};" for k in range(7))

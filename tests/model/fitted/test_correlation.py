@@ -60,7 +60,7 @@ BAD = {
     "not symmetric": ("[0.25, 1.0]]", "[0.5, 1.0]]", "not symmetric; got 0.25 and 0.5 between body.mass_kg and motor"),
     "diagonal": ("[[1, 0.25]", "[[0.5, 0.25]", r"matrix\[0\]\[0\] is not 1; got 0.5; expected 1, with itself"),
     "above 1": ("[[1, 0.25], [0.25, 1.0]]", "[[1, 1.5], [1.5, 1.0]]", r"matrix\[0\]\[1\].*got 1.5; expected .*equal"),
-    "text": ("[[1, 0.25]", '[[1, "0.25"]', r"matrix\[0\]\[1\]: cannot use this value; got 0.25"),
+    "text": ("[[1, 0.25]", '[[1, "0.25"]', r'matrix\[0\]\[1\]: cannot use this value; got the text "0.25"'),
     "NaN": ("[[1, 0.25]", "[[1, nan]", r"matrix\[0\]\[1\]: cannot use this value; got nan; expected a finite number"),
     "unknown number": (
         "body.mass_kg",

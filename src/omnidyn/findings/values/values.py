@@ -86,21 +86,17 @@ def _missing(work: LogUnderCheck) -> list[Finding]:
     if work.log.own_clocks:  # a topic has nothing to say before its first message and behind its last
         return findings
     for channel in work.channels:
+        alike: dict[bytes, list[str]] = {}  # components that miss the same rows: one finding
         for component, values in work.sampled_columns(channel):
-            mask = ~np.isfinite(values)
+            alike.setdefault((~np.isfinite(values)).tobytes(), []).append(component)
+        for rows, components in alike.items():
+            mask = np.frombuffer(rows, dtype=bool)
             share = float(mask.mean())
             if share > 0.0:
                 grave = share > MAX_MISSING and channel not in ("pose", "twist", "supply")
-                findings.append(
-                    Finding(
-                        "missing",
-                        WARNING if grave else NOTE,
-                        component,
-                        {"share": share},
-                        rows=work.lines(mask),
-                        count=int(mask.sum()),
-                    )
-                )
+                severity, numbers = WARNING if grave else NOTE, {"share": share}
+                subject, count = " ".join(components), int(mask.sum())
+                findings.append(Finding("missing", severity, subject, numbers, rows=work.lines(mask), count=count))
     return findings
 
 

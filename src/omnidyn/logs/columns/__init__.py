@@ -6,5 +6,6 @@ plausible (what numbers can be) and guessed (columns and doubts so far).
 guess_side: the side of the gear.
 doubts: columns that were not taken.
 wheel_places: places of wheels in names.
+unnamed_families: numbered columns whose names say no quantity.
 wheels_by_motion: wheels told by the motion.
 """

@@ -45,17 +45,18 @@ def exact_component(name: str) -> str | None:
     return None
 
 
-def component_of(name: str, unit: Unit | None, wheel: int | None) -> str | None:
+def component_of(name: str, unit: Unit | None, wheel: int | None, is_declared: bool = False) -> str | None:
     """The component that a column is called, as in a run file or in other words.
 
-    wheel: the number of the wheel, from 1, that the number or the place in its name means.
+    wheel: the number of the wheel, from 1, that the number or the place in its name means. is_declared: whether the
+    user said the unit, which then says what no word does.
     """
     exact, parts = exact_component(name), read_name(name)
     if exact is None and (location := place(name)) is not None and location[0] == "force":
         return name  # f1: no number of a wheel
     if exact is not None and wheel is not None and parts.number != wheel:
         exact = None  # a run file counts from 1, this one does not
-    return exact or component_of_parts(parts, unit, wheel)
+    return exact or component_of_parts(parts, unit, wheel, is_declared)
 
 
 def is_other(name: NameParts) -> bool:
@@ -64,7 +65,7 @@ def is_other(name: NameParts) -> bool:
     return sensor or bool(name.roles & {words.OTHER, words.CHANNEL})
 
 
-def component_of_parts(name: NameParts, unit: Unit | None, wheel: int | None) -> str | None:
+def component_of_parts(name: NameParts, unit: Unit | None, wheel: int | None, is_declared: bool = False) -> str | None:
     """The component that the words of a name say, None where they say none or too many."""
     unit = unit or name.unit
     if is_other(name) and not (name.of_one_wheel and unit) and not _documented_letter(name, unit):
@@ -72,7 +73,7 @@ def component_of_parts(name: NameParts, unit: Unit | None, wheel: int | None) ->
     if unit is not None and unit.quantity not in _LOG_QUANTITIES:
         return None
     command = "_cmd" if words.COMMAND in name.roles else ""
-    letter = numbered_kind(name, unit)
+    letter = numbered_kind(name, unit, is_declared)
     if name.of_one_wheel:
         if wheel is None or letter is None or (command and letter in ("i", "a")):
             return None
@@ -83,10 +84,11 @@ def component_of_parts(name: NameParts, unit: Unit | None, wheel: int | None) ->
     return _body_component(name, unit, command)
 
 
-def numbered_kind(name: NameParts, unit: Unit | None) -> str | None:
+def numbered_kind(name: NameParts, unit: Unit | None, is_declared: bool = False) -> str | None:
     """The letter of a component of a wheel, None where the words do not say.
 
-    A unit outweighs a word of its kin and no word (motor_1_V); volts of an encoder are no voltage of a motor.
+    A unit outweighs a word of its kin and no word (motor_1_V), and any that says nothing where the user declares it;
+    volts of an encoder are no voltage of a motor.
     """
     if not name.of_one_wheel:
         return None
@@ -98,14 +100,14 @@ def numbered_kind(name: NameParts, unit: Unit | None) -> str | None:
     if unit is not None and unit.quantity == SPEED and words.LINEAR in roles and roles <= _OF_A_RIM:
         return "w"  # v1_m_s: of the rim of wheel 1
     letters = [letter for role, letter in _NUMBERED if role in roles]
-    letter = letters[0] if letters else None
+    letter = letters[0] if letters else "a" if words.YAW in roles else None  # phi_1, where a family of them is wheels
     by_unit = BY_UNIT.get(unit.quantity) if unit is not None else None
     if by_unit is not None:
         volts = by_unit == "u" and roles == {words.LINEAR}  # V1 [V]
         unknown = frozenset() if by_unit == "d" else {words.OTHER}  # humidity_% is no duty
         no_word = volts or roles & {words.MOTOR, words.WHEEL} or not roles - {words.CHANNEL, words.COMMAND, *unknown}
         kin = _KIN[by_unit] + ("w" if by_unit == "d" and words.COMMAND in roles else "")  # a speed is set in percent
-        if (set(letters) & set(kin)) if letters else no_word:
+        if (set(letters) & set(kin)) if letters else no_word or is_declared:
             letter = by_unit
     return None if letter in ("u", "d") and words.SENSOR in roles else letter
 

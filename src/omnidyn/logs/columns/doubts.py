@@ -19,18 +19,20 @@ class Doubt(Statement):
     """Columns of one kind that were not taken; the code says why.
 
     columns: their names. components: what each looks like. units: those that would settle it; () where none does.
+    stem: what columns of a family are called but for their numbers, where a unit of that name settles it; else "".
     """
 
     columns: tuple[str, ...] = ()
     components: tuple[str, ...] = ()
     units: tuple[str, ...] = UNIT
+    stem: str = ""
 
     __hash__ = Statement.__hash__
 
     @property
     def declarations(self) -> tuple[tuple[str, str], ...]:
         """(option, text) of each declaration that settles it, such as ("assume", "d=%") or ("column", "t=now:ms")."""
-        letter = letter_of(self.components[0]) if self.components else ""
+        letter = self.stem or (letter_of(self.components[0]) if self.components else "")
         if len(self.columns) == 1 and letter == self.components[0]:
             return tuple(("column", f"{letter}={self.columns[0]}:{unit}") for unit in self.units)
         return tuple(("assume", f"{letter}={unit}") for unit in self.units)

@@ -31,6 +31,7 @@ from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
 from omnidyn.logs.columns.mapping import ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import AGAIN, BRACKETS, read_name
 from omnidyn.logs.columns.plausible import beyond_range
+from omnidyn.logs.columns.unnamed_families import unnamed_families, volts_or_speeds
 from omnidyn.logs.columns.wheel_numbers import BY_PLACES, wheel_numbers
 from omnidyn.logs.columns.wheels_by_motion import proposed_wheels
 from omnidyn.logs.table.table import FileTable
@@ -75,11 +76,12 @@ def guess_columns(
     names = _without_measured_power(names)
     table = replace(table, units={**_units_of_letters(names, assumed, table.units), **table.units})
     _take_said(table, assumed, guess)
-    numbers = wheel_numbers(table, names, guess)
+    numbers = wheel_numbers(table, names, guess, assumed)
     for name in names:
         _take(table, name, numbers, assumed, robot, guess)
     _doubt_words(table, wheel_numbers(table, table.names, Guess()), guess)
-    _doubt_letters(names, guess)
+    if "u1" not in guess.columns:
+        guess.doubts += volts_or_speeds(names)
     if TIME not in guess.columns:
         take_time(table, assumed, guess)
     if set(numbers.values()) <= {1} and not any(
@@ -104,7 +106,17 @@ def guess_columns(
             (*guess.columns, *(open_doubt.components[0] for open_doubt in guess.doubts), *(taken or {}).values()),
         )
     )
-    return ColumnMap(ordered, unused, (*joined_doubts(guess.doubts), *idle), guess.all_notes())
+    doubts = (*joined_doubts(guess.doubts), *_unnamed(table, names, guess, taken or {}), *idle)
+    return ColumnMap(ordered, unused, doubts, guess.all_notes())
+
+
+def _unnamed(table: FileTable, names: Iterable[str], guess: Guess, taken: Mapping[str, str]) -> list[Doubt]:
+    """The doubts about columns that nobody took or doubted, and whose names and units say nothing."""
+    used_names = {*(column.name for column in guess.columns.values()), *taken}
+    used_names |= {name for open_doubt in guess.doubts for name in open_doubt.columns}
+    unknown = [name for name in names if name not in used_names and not (read_name(name).unit or table.units.get(name))]
+    components = {component for open_doubt in guess.doubts for component in open_doubt.components}
+    return unnamed_families(unknown, {*guess.columns, *components, *taken.values()}, guess.robot)
 
 
 def _without_measured_power(names: list[str]) -> list[str]:
@@ -142,9 +154,14 @@ def _unlikely(table: FileTable, name: str, component: str, unit: str, robot: Rob
 
 
 def _meant(name: str, names: Iterable[str]) -> list[str]:
-    """The columns called so but for a number behind; the name itself where there are none, or it is a letter."""
-    numbered = [column_name for column_name in names if re.fullmatch(re.escape(name) + r"[ _]?\d+", column_name)]
-    return numbered if numbered and name not in names and not place(f"{name}1") else [name]
+    """The columns called so but for a number or a place; the name itself where there are none, or it is a letter."""
+    family = [
+        column_name
+        for column_name in names
+        if re.fullmatch(re.escape(name) + r"[ _]?\d+", column_name)
+        or ((parts := read_name(column_name)).place is not None and parts.before == name)
+    ]
+    return family if family and name not in names and not place(f"{name}1") else [name]
 
 
 def _is_used(name: str, table: FileTable, components: Iterable[str]) -> bool:
@@ -188,7 +205,7 @@ def _take(
     table_unit = table.units.get(name, "")
     unit = known_unit(assumed[name]) if name in assumed else known_unit(table_unit) if table_unit else None
     parts = read_name(name)
-    component = component_of(name, unit, numbers.get(name))
+    component = component_of(name, unit, numbers.get(name), name in assumed)
     if component is None:
         _doubt_brackets(name, numbers, guess)
         return
@@ -223,21 +240,6 @@ def _doubt_brackets(name: str, numbers: Mapping[str, int], guess: Guess) -> None
     component = component_of_parts(read_name(match[1]), None, numbers.get(name)) if match else None
     if match and component is not None:
         guess.doubts.append(doubt(name, component, "unit_unknown", unit=match[2]))
-
-
-def _doubt_letters(names: list[str], guess: Guess) -> None:
-    """V1, V2, ..: volts, or speeds of the rims? Nobody knows."""
-    parts = {name: read_name(name) for name in names}
-    voltage_names = [
-        name
-        for name, read in parts.items()
-        if read.number is not None and read.unit is None and read.roles == {words.LINEAR}
-    ]
-    if voltage_names and "u1" not in guess.columns:
-        guess.doubts += [
-            doubt(name, f"u{parts[name].number}", "volts_or_speeds", (), first=voltage_names[0])
-            for name in voltage_names
-        ]
 
 
 def _enter(table: FileTable, name: str, component: str, unit: Unit, is_declared: bool, guess: Guess) -> None:

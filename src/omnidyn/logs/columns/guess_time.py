@@ -59,7 +59,9 @@ def take_time(table: FileTable, assumed: Mapping[str, str], guess: Guess) -> Non
     if not candidates:
         increasing = [name for name in table.names if _increases(table.columns[name])]
         if increasing:
-            guess.doubts.append(doubt(increasing[0], TIME, "clock_unit_unknown"))
+            step, units = _possible_units(floats(table.columns[increasing[0]]))
+            texts = tuple(unit.text for unit in units) if step != 1.0 else UNIT  # one by one: rows that are counted
+            guess.doubts.append(doubt(increasing[0], TIME, "clock_unit_unknown", texts or UNIT))
         return
     name = candidates[0]
     text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
@@ -115,11 +117,7 @@ def _plausible_time(table: FileTable, values: FloatArray, name: str, declared_un
         guess.doubts.append(doubt(name, TIME, "unit_unknown", unit=declared_unit))
         return None
     finite = values[np.isfinite(values)]
-    steps = np.diff(finite)
-    steps = steps[steps > 0.0]
-    step = float(np.median(steps)) if steps.size else 0.0
-    units = [parse_unit(text) for text in TIME_NAMES]
-    possible = [unit for unit in units if _is_step(step * unit.size, len(finite))]
+    step, possible = _possible_units(values)
     if len(possible) > 1:
         since_1970 = [unit for unit in possible if NOWADAYS[0] <= finite[0] * unit.size <= NOWADAYS[1]]
         possible = since_1970 if len(since_1970) == 1 else _of_motion(table, values, possible, guess)
@@ -129,6 +127,16 @@ def _plausible_time(table: FileTable, values: FloatArray, name: str, declared_un
         return None
     guess.note("time_unit_taken", column=name, unit=possible[0].text, step_s=step * possible[0].size)
     return possible[0]
+
+
+def _possible_units(values: FloatArray) -> tuple[float, list[Unit]]:
+    """(the usual step between rows in the unit of the column, the units in which rows may be so far apart)."""
+    finite = values[np.isfinite(values)]
+    steps = np.diff(finite)
+    steps = steps[steps > 0.0]
+    step = float(np.median(steps)) if steps.size else 0.0
+    units = [parse_unit(text) for text in TIME_NAMES]
+    return step, [unit for unit in units if _is_step(step * unit.size, len(finite))]
 
 
 def _is_step(step: float, rows: int) -> bool:

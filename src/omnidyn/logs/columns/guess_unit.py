@@ -141,15 +141,15 @@ def _command_unit(table: FileTable, name: str, component: str, robot: Robot | No
     """Volts or duty? Volts where a name spells them, or the largest lies between 1 and the robot's limit."""
     largest = _largest(floats(table.columns[name]))
     if component.startswith("d") and largest <= 1.0:
-        guess.note("taken_as_duty", column=name)
+        guess.note_unit("taken_as_duty", name)
         return parse_unit("duty")
     spoken = any(word in name.lower() for word in ("volt", "spannung"))
     if component.startswith("u") and 1.0 < largest <= MOST_VOLTS and spoken:
-        guess.note("taken_as_volts", column=name)
+        guess.note_unit("taken_as_volts", name)
         return parse_unit("V")
     limit = voltage_limit(robot)
     if component.startswith("u") and limit is not None and 1.0 < largest <= 1.05 * limit:
-        guess.note("taken_as_volts", column=name, largest=largest)
+        guess.note_unit("taken_as_volts_by_size", name, largest)
         return parse_unit("V")
     alike = [column_name for column_name in table.names if re.sub(r"\d+", "", column_name) == re.sub(r"\d+", "", name)]
     largest = max(

@@ -30,6 +30,13 @@ class Guess:
         note = Statement(code, NOTE, "", numbers)
         self.notes += [] if note in self.notes else [note]
 
+    def note_unit(self, code: str, column: str, largest: float = 0.0) -> None:
+        """Note a unit that was taken for a column; those of one code are one note, with the largest of all."""
+        alike = [note for note in self.notes if note.code == code]
+        columns = [*(name for note in alike for name in note.numbers["columns"]), column]
+        self.notes = [note for note in self.notes if note not in alike]
+        self.note(code, columns=columns, largest=max(largest, *(note.numbers["largest"] for note in alike), 0.0))
+
     def all_notes(self) -> tuple[Statement, ...]:
         """What was decided, units taken as SI last."""
         if self.si:

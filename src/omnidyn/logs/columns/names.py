@@ -145,6 +145,12 @@ def read_name(name: str) -> NameParts:
     return NameParts(frozenset(roles), number, unit, before, place, letter)
 
 
+def says_no_quantity(name: str) -> bool:
+    """Whether no known word of a name says what is measured: those of in_1, motor2 and theta3 do not, temp_1 does."""
+    spoken = re.findall(r"[^\W\d_]+", _without_accents(name).lower())
+    return {_ROLE[part] for word in spoken for part in _parts(word)} <= _NO_QUANTITY
+
+
 def _without_accents(name: str) -> str:
     """Spannung and tensión in plain letters; signs of units such as ° and µ stay."""
     letters = unicodedata.normalize("NFD", name)
@@ -183,6 +189,8 @@ _SAYS_ITS_UNIT = ("rpm", "dps", "millis", "micros")  # a quantity and its unit i
 _NO_UNIT_INSIDE = {"turn", "turns", "rev", "min", "sec", "in", "ft", "per"}
 _OF_A_WHEEL = {MOTOR, WHEEL, VOLTAGE, CURRENT, DUTY, RATE, ANGLE}
 _OF_NO_WHEEL = {BODY, SUPPLY, TIME}
+_NO_QUANTITY = {MOTOR, WHEEL, MEASURED, COMMAND, YAW, Y}
+GREEK = {"theta", "phi", "psi", "alpha"}  # with a number behind, an angle: of a wheel, or of one of several robots
 
 
 def _number(text: str) -> tuple[int | None, str]:

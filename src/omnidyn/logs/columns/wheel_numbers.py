@@ -10,7 +10,7 @@ from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.component import component_of_parts, numbered_kind
 from omnidyn.logs.columns.doubts import doubt
 from omnidyn.logs.columns.guessed import Guess
-from omnidyn.logs.columns.names import BRACKETS, read_name
+from omnidyn.logs.columns.names import BRACKETS, GREEK, read_name
 from omnidyn.logs.columns.wheel_places import wheels_at
 from omnidyn.logs.table.table import FileTable
 from omnidyn.model.wheels import MAX_WHEELS
@@ -38,24 +38,33 @@ class Family(NamedTuple):
         return path or "", word.endswith("["), word if of_motor else ""
 
 
-def wheel_numbers(table: FileTable, names: Iterable[str], guess: Guess) -> dict[str, int]:
+def wheel_numbers(
+    table: FileTable, names: Iterable[str], guess: Guess, assumed: Mapping[str, str] | None = None
+) -> dict[str, int]:
     """Name -> number of the wheel from 1, of the names with a number or a place; a family from 0 on is shifted.
+
+    assumed: name -> unit that the user says.
 
     A family that does not count from 0 itself is shifted with one of its style that does (the current of wheel 0 may
     not be logged), unless it counts farther than wheels that are counted from 0 can: u0 u1 u2 beside w1 w2 w3.
     """
     families: dict[Family, dict[str, int]] = {}
+    headings: dict[Family, dict[str, int]] = {}
     placed: dict[Family, dict[str, float]] = {}
+    assumed = assumed or {}
     for name in names:
         bare = BRACKETS.fullmatch(name)  # speed1 [pix/s]: what is known without its unit
-        parts, unit = read_name(bare[1] if bare else name), known_unit(table.units.get(name, ""))
-        letter = numbered_kind(parts, unit)
-        if letter is not None and component_of_parts(parts, unit, 1) is not None:
+        parts = read_name(bare[1] if bare else name)
+        unit = known_unit(assumed.get(name) or table.units.get(name, ""))
+        letter = numbered_kind(parts, unit, name in assumed)
+        if letter is not None and component_of_parts(parts, unit, 1, name in assumed) is not None:
             family = Family(letter, words.COMMAND in parts.roles, parts.before)
+            says_heading = words.YAW in parts.roles <= {words.YAW, words.MEASURED} and name not in assumed
             if parts.number is not None:
-                families.setdefault(family, {})[name] = parts.number
-            elif parts.place is not None:
+                (headings if says_heading else families).setdefault(family, {})[name] = parts.number
+            elif parts.place is not None and not says_heading:
                 placed.setdefault(family, {})[name] = parts.place
+    families |= _angles_of_wheels(headings, families)
     _leave_out_boards(families, guess)
     ends: dict[tuple[str, bool, str], int] = {}
     for family, members in families.items():
@@ -77,6 +86,18 @@ def wheel_numbers(table: FileTable, names: Iterable[str], guess: Guess) -> dict[
     return valid | _by_place(
         {family: members for family, members in placed.items() if family.letter not in counted}, guess
     )
+
+
+def _angles_of_wheels(
+    headings: Mapping[Family, dict[str, int]], families: Mapping[Family, Mapping[str, int]]
+) -> dict[Family, dict[str, int]]:
+    """Those of phi_1, phi_2, .. that are numbered as another family of wheels is; others may be of several robots."""
+    counts = [sorted(members.values()) for members in families.values()]
+    return {
+        family: members
+        for family, members in headings.items()
+        if not GREEK.isdisjoint(re.findall(r"[a-z]+", family.before)) and sorted(members.values()) in counts
+    }
 
 
 def _by_place(families: Mapping[Family, Mapping[str, float]], guess: Guess) -> dict[str, int]:

@@ -15,15 +15,13 @@ from omnidyn.files import too_large
 from omnidyn.logs.table import dialect
 from omnidyn.logs.table.rows import Column
 from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY
+from omnidyn.run import LARGEST_SIZE
 from omnidyn.statement import Statement
 
 ROWS = 500_000
 MAX_CELLS = 2**24  # in one block: 128 MiB of floats
 MIN_HELD_BYTES = 64 * 2**20
-LEAST_SIZE, LARGEST_SIZE = (
-    1e-100,
-    1e20,
-)  # sizes of a number of a log, beside 0: counters of 64 bits go to 2e19
+LEAST_SIZE = 1e-100  # of a number of a log, beside 0
 
 
 class Declaration(NamedTuple):

@@ -6,7 +6,7 @@ import os
 from functools import cache
 from pathlib import Path
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, did_you_mean
 from omnidyn.files import open_regular
 
 PRESETS = Path(__file__).parent
@@ -33,7 +33,7 @@ def robot_path(name: str) -> str:
             "no such robot",
             got=name,
             expected=f"a TOML file or a preset: {', '.join(preset_names())}",
-            remedy=f"did you mean {neighbour}?" if neighbour else "",
+            remedy=f"did you mean {neighbour}?" if neighbour else did_you_mean(name, preset_names()),
         )
     with open_regular(name):
         return name

@@ -79,7 +79,9 @@ SENTENCES = {
         "{count} rows at the end all repeat one row, at an earlier time: the recorder filled its buffer up",
         "they are left out; cut them off",
     ),
-    "time_back": Sentence("time goes back {count} times, by up to {farthest_s:.4g} s", SPLIT, {"often": COARSE_CLOCK}),
+    "time_back": Sentence(
+        "time goes back {count} {count:time|times}, by up to {farthest_s:.4g} s", SPLIT, {"often": COARSE_CLOCK}
+    ),
     "time_repeats": Sentence(
         _time_repeats, "only the first of them is used", {"often": "only the first of them is used; log a finer clock"}
     ),
@@ -94,7 +96,8 @@ SENTENCES = {
         "the times as logged are used, not a fixed rate",
     ),
     "few_rows": Sentence(
-        "{rows:.0f} rows with a time: too few to judge noise, wiring or scale from", "log longer, 10 s or more"
+        "{rows:.0f} {rows:row|rows} with a time: too few to judge noise, wiring or scale from",
+        "log longer, 10 s or more",
     ),
     "clock_restart": Sentence(
         "the time begins again in line {line}, at {behind_s:.6g} s after {before_s:.6g} s: a recording of its own "

@@ -134,8 +134,8 @@ SENTENCES = {
         "leave those cells blank",
     ),
     "missing": Sentence(
-        "{share:%.3g} % of {subject} is missing",
-        "rows without it are not used where it is needed",
+        "{share:%.3g} % of {subject!w} {subject:is|are} missing",
+        "rows without {subject:it|them} are not used where {subject:it is|they are} needed",
     ),
     "quantised": Sentence(_quantised, "average over longer windows; a sample alone says little"),
     "reads_zero": Sentence(
@@ -195,9 +195,9 @@ SENTENCES = {
         "drive with a higher voltage; such a log bounds friction from below and says nothing else",
     ),
     "blocked": Sentence(
-        "for {seconds:~.3g} s the robot stands although it is driven hard enough to move: it was held, stood "
-        "against something, or its friction is far above that of the robot file",
-        "leave those rows out",
+        "for {seconds:~.3g} s the robot stands still although it is driven hard enough to move: something held it, "
+        "or its friction is far above that of the robot file",
+        "if something held it, delete these rows from the file; if nothing did, keep them: they tell its friction",
     ),
     "droop": Sentence(_droop, "fit friction against measured speed, not against the commanded one"),
     "start_up": Sentence(

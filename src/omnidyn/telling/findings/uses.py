@@ -47,7 +47,7 @@ def _summary(statement: Statement) -> str:
     n = statement.numbers
     rate = f" at {n['rate_Hz']:.4g} Hz" if n["rate_Hz"] > 0.0 else ""
     duration = f", {short(n['duration_s'], '.4g')} s{rate}" if n["duration_s"] > 0.0 else ""
-    return f"{statement.subject or 'log'}: {n['rows']} rows{duration}: {severities(n)}"
+    return f"{statement.subject or 'log'}: {counted(n['rows'], 'row')}{duration}: {severities(n)}"
 
 
 def severities(counts: Mapping[str, Any]) -> str:
