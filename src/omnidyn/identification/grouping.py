@@ -25,7 +25,11 @@ def held_out(sources: Sequence[str], patterns: Sequence[str]) -> list[bool]:
     for pattern in patterns:
         if not any(matches(source, pattern) for source in sources):
             raise InputError(
-                "no log to hold out", got=pattern, expected="a glob or a folder of LOG...", where="hold_out"
+                "no log to hold out",
+                got=pattern,
+                expected="a name, a glob or a folder of logs that are given",
+                remedy="give that log among the others too: it is read, and left out of the fit",
+                where="hold_out",
             )
     held_out_mask = [any(matches(source, pattern) for pattern in patterns) for source in sources]
     if patterns and all(held_out_mask):

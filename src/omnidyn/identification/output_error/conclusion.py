@@ -424,4 +424,5 @@ def _unit(name: str) -> str:
 def _data(records: Sequence[Record]) -> str:
     rows = sum(last - first + 1 for r in records for first, last in r.pieces)
     first = records[0].source or "unnamed"
-    return f"{first}, {rows} rows" if len(records) == 1 else f"{first} and {len(records) - 1} more logs, {rows} rows"
+    more = f" and {len(records) - 1} more log{'s'[: len(records) - 2]}" if len(records) > 1 else ""
+    return f"{first}{more}, {rows} rows"
