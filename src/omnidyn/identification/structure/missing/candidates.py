@@ -154,7 +154,11 @@ def _unlike_others(bench: Workbench, mass: float) -> Iterator[Candidate]:
     if not 1 < len(records) <= MOST_LOGS:
         return
     first = int(len(records) == 2)
-    for subject, force, whole in (("mass", _inertia, mass), ("friction", _friction, np.inf), ("supply", _drive, 1.0)):
+    for subject, force, whole in (
+        ("mass", _inertia, mass),
+        ("friction", _dry_friction, np.inf),
+        ("supply", _drive, 1.0),
+    ):
         cause_in_log = sized(
             "differs_in_one_log",
             subject,
@@ -229,6 +233,11 @@ def _seconds(bench: Workbench, share: float) -> float | None:
 def _friction(motion: DrivenMotion) -> FloatArray:
     speed = motion.twist[:, None, :]
     return -np.concatenate([np.eye(N_AXES) * np.sign(speed), np.eye(N_AXES) * speed], axis=1)
+
+
+def _dry_friction(motion: DrivenMotion) -> FloatArray:
+    """Its level on each axis, which is what another floor changes: viscous friction stands in for a supply."""
+    return _friction(motion)[:, :N_AXES]
 
 
 def _inertia(motion: DrivenMotion) -> FloatArray:
