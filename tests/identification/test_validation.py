@@ -80,6 +80,20 @@ def test_what_lasts_is_not_called_small(fit):
     assert found.numbers["share"] > 0.5
 
 
+def test_what_lasts_in_counts_is_not_called_noise():
+    """Whether errors of counts are white is not asked: what the model leaves out there is no noise for it."""
+    weak = Key.parse("motor.resistance_ohm").set(AXEBOT, 2.0 * AXEBOT.motor.resistance)
+    run = simulate(weak, excitation(20.0), 0.01)
+    turned = np.cumsum(run.wheel_speed * 0.01, axis=0)
+    tick = 2.0 * np.pi / 4096
+    log = Run(t=run.t, voltage=run.voltage, wheel_angle=np.floor(turned / tick) * tick)
+    wrong = identify(log, AXEBOT, OutputError(nuisances=())).estimate
+    assert wrong.lack_of_fit.found
+    found = validate(wrong, [log], [log]).statement()
+    assert found.code == "held_out_colour"
+    assert found.numbers["share"] > 0.5
+
+
 def test_noise_that_remembers_is_not_taken_for_a_fault():
     """A right model, noise of a correlation of .9 from row to row: nothing lasts but the noise."""
 

@@ -37,7 +37,7 @@ EXCLUSIVE = (  # of each pair not both, of one subject
     ({"latency_like_zero"}, {"late_by_rows", "implausible_latency"}),
     ({"no_lack_of_fit"}, {"no_shape_fits"}),
     ({"changes_not_tested"}, {"changes_within_run"}),
-    ({"held_out_noise"}, {"held_out_misfit", "held_out_colour"}),
+    ({"held_out_noise"}, {"held_out_misfit", "held_out_colour"} | MISFITS),
     ({"given_predicts_better"}, {"plain_predicts_better", "size_fitted"}),
 )
 

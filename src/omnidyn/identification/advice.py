@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from omnidyn.identification.lack_of_fit import CHANGE, Remedy
+from omnidyn.identification.lack_of_fit import CHANGE, OF_LOGS, ONE_LOG, Remedy
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES
 from omnidyn.identification.validation import Validation
@@ -78,16 +78,19 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[Statement]:
         }
         yield Statement("missing_cause", NOTE, remedy.key, numbers | remedy.largest_changes())
     best = next(iter(lack.causes), None)
-    if fit.ladder is None and (best is None or (best.offered and best.key != CHANGE)):
+    if fit.ladder is None and (best is None or (best.offered and best.key not in OF_LOGS)):
         yield Statement("try_ladder", NOTE)
 
 
 def next_action(remedy: Remedy) -> str:
-    """What to do about a remedy: "distinguish" it from others, "fit" a nuisance, "look", "limit", "measure", "put"."""
+    """What to do about a remedy: "distinguish" it from others, "fit" a nuisance, "look", "limit", "measure", "put", or
+    what differs in one log."""
     if remedy.same_as:
         return "distinguish"
     if remedy.key.partition(".")[0] in NUISANCES:
         return "fit"
+    if remedy.key in ONE_LOG.values():
+        return remedy.key
     if remedy.key in (CHANGE, LIMIT):
         return "look" if remedy.key == CHANGE else "limit"
     key = find_key(remedy.key)

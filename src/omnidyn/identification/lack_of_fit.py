@@ -17,6 +17,8 @@ from omnidyn.statement import NOTE, WARNING, Statement, statements
 LOSS = "loss"  # the key of a remedy for outliers, which is no cause of a misfit
 MAIN_SHARE = 0.7  # of all that residuals hold beside noise, that a remedy must explain to be the one
 CHANGE = "change"  # the key of friction that is another one from some time of the log on
+ONE_LOG = {subject: f"{subject} of one log" for subject in ("mass", "friction", "supply")}  # keys of what differs there
+OF_LOGS = (CHANGE, *ONE_LOG.values())  # what no robot has a number for: its logs are not alike
 # What robots do that no law holds yet: keys.
 UNOFFERED_CAUSES = ("friction one way", "drag", "turns of the wheels", "sag", "heat", "filter")
 REPEATS, HOLDS, NEIGHBOURS, REST, ROUNDING = "repeats", "holds", "neighbours", "rest", "rounding"  # sources of a level

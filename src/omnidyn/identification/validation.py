@@ -20,7 +20,7 @@ from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import counts_from_start, unit
 from omnidyn.comparison.verdict import is_missed
 from omnidyn.document import Document, Points, Table, cell, chance_cell
-from omnidyn.identification.lack_of_fit import LackOfFit
+from omnidyn.identification.lack_of_fit import LINE_SHARE, LackOfFit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.logs.channels import place
 from omnidyn.progress import Progress, Report, silent
@@ -104,7 +104,8 @@ class Validation:
             is_far_when_fitted = all(name in fitted and (fitted[name].chi2 or 0.0) > CHI2_LIMIT for name in far_names)
             numbers = {"components": tuple(far_names), "chi2": worst_chi2, "fitted_too": is_far_when_fitted}
             return Statement("held_out_misfit", WARNING, numbers=numbers)
-        names = coloured(held_out_scores)
+        misfit = self.misfit or {}
+        names = [name for name in held_out_scores if misfit.get(name, 0.0) >= LINE_SHARE] or coloured(held_out_scores)
         if not names:
             return Statement("held_out_noise", NOTE)
         share = None if self.misfit is None else max((self.misfit.get(name, 0.0) for name in names), default=0.0)

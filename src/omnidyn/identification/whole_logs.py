@@ -21,6 +21,7 @@ from omnidyn.run import Run
 from omnidyn.statement import WARNING, Statement
 
 LATE_ROWS = 2.0  # rows of a latency from which it is doubted: a drive answers sooner
+RADIUS_SHARE = 0.2  # by which a wheel radius may be another one than in the file
 SIZE = ("wheels.wheel_radius_m", "body.inertia_kg_m2")  # what a robot that follows late may have other than its file
 
 
@@ -82,6 +83,8 @@ def with_size(fit: Fit, solution: Solution, runs: Sequence[Run], progress: FitPr
         wider_solution = wider_solution.gone_on(inner_progress)
     except OmnidynError:  # the logs do not tell these numbers
         return fit, solution
+    if not _may_be_worn(wider_solution):
+        return fit, solution
     margins = margins_of([solution, wider_solution])
     narrow_run, wide_run = free_run(solution, margins), free_run(wider_solution, margins)
     comparison = wide_run.improvement(narrow_run)
@@ -100,6 +103,13 @@ def with_size(fit: Fit, solution: Solution, runs: Sequence[Run], progress: FitPr
         plain_solution=solution.plain_solution,
         notes=(size_note, *wider_solution.notes, *_late(wider_solution)),
     )
+
+
+def _may_be_worn(solution: Solution) -> bool:
+    """Whether the wheel radius, where it is fitted, is about that of the file: a ruler is not off by more."""
+    problem = solution.solver.problem
+    j = problem.where(SIZE[0])
+    return j < 0 or bool(abs(solution.state.point.values[j] / problem.parameters[j].value - 1.0) < RADIUS_SHARE)
 
 
 def _late(solution: Solution) -> list[Statement]:

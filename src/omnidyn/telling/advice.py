@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from omnidyn.document import all_of, short
+from omnidyn.identification.lack_of_fit import ONE_LOG
 from omnidyn.model.keys import find_key, in_words, unit
 from omnidyn.statement import Statement
 from omnidyn.telling.causes import changes, named
@@ -11,6 +12,12 @@ from omnidyn.telling.sentence import Sentence
 
 LONGEST_FACTOR = 100.0  # times as long as now: nobody records more
 WAYS = {  # what to do about a cause
+    ONE_LOG["mass"]: "fit that log apart from the others, both times with the mass that the robot had",
+    ONE_LOG["friction"]: (
+        "leave that log out, or fit the logs in groups (`per`), each with friction of its own; where no voltage of the "
+        "battery is logged, a lower one looks much the same"
+    ),
+    ONE_LOG["supply"]: "log the voltage of the battery in every log, or leave that log out",
     "look": "look what happened there; fit the parts as logs of their own",
     "limit": 'put about that value into the robot file, {name} = {{ value = .., origin = "guess" }}, and fit again',
     "measure": "measure it and put it into the robot file",

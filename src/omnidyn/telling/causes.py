@@ -90,6 +90,13 @@ def _changes(statement: Statement) -> str:
     return f"{statement.subject} that changes{about} {when}"
 
 
+def _in_one_log(statement: Statement) -> str:
+    """Mass, friction or supply is another one in one log."""
+    log, other, share = (statement.numbers[name] for name in ("log", "other", "share"))
+    size = f", by roughly {short(100.0 * share, '+.1g')} %" if share else ""  # a step finds two thirds of it, or all
+    return f"another {statement.subject} in {log} than in {other or 'the other logs'}{size}"
+
+
 def _other_shape(statement: Statement) -> str:
     """Coulomb friction is of another shape."""
     return f"Coulomb friction of another shape, {SHAPES[statement.subject]}"
@@ -112,6 +119,7 @@ SENTENCES = {
     "push_on_the_body": Sentence("a constant push in the body, as of a brush that drags"),
     "late_channel": Sentence(_late),
     "change_on_the_way": Sentence(_changes),
+    "differs_in_one_log": Sentence(_in_one_log),
     "turning_frame": Sentence("the forces of a turning frame"),
     "no_turning_frame": Sentence("no forces of a turning frame"),
     "centre_off_the_middle": Sentence("a centre of mass off the middle of the wheels"),

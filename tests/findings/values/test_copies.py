@@ -75,5 +75,28 @@ def test_wheels_that_friction_holds_may_get_different_voltages():
     assert "error" in {finding.severity for finding in check(moved).of("equal")}
 
 
+@pytest.mark.parametrize("with_pose", [False, True])
+def test_wheels_of_a_robot_that_spins_are_no_copies_beside_different_voltages(robot, with_pose):
+    """Motors that differ turn it in place, and friction holds it where the rest of their push would drive it."""
+    t, rng = np.arange(800) * 0.01, np.random.default_rng(3)
+    tick, turns = 2.0 * np.pi / 360, robot.wheels.robot_radius / robot.wheels.wheel_radius
+    heading = 3.5 * (1.0 - np.cos(2.0 * np.pi * t / 5.0))
+    angle = np.floor(turns * heading / tick)[:, None] * tick * np.ones(3)
+    voltage = np.sin(2.0 * np.pi * t / 5.0)[:, None] * [5.0, 6.5, 3.5]
+    pose = np.column_stack([np.zeros((len(t), 2)), heading]) + rng.normal(0.0, 0.002, (len(t), 3))
+    channels = {"voltage": voltage, "wheel_angle": angle} | ({"pose": pose} if with_pose else {})
+    spun = Log(t, channels, np.arange(len(t)) + 2, source="spin.csv")
+    assert {finding.severity for finding in check(spun, robot).of("equal")} == {"note"}
+
+
+def test_one_counter_in_all_columns_of_a_robot_that_drives_about_is_an_error(log, robot, with_channels):
+    speed = log.channels["wheel_speed"][:, :1] * np.ones(3)
+    voltage = log.channels["voltage"]
+    volts = voltage - 0.5 * voltage.mean(axis=1, keepdims=True)  # less of it turns the robot in place
+    verdict = check(with_channels(wheel_speed=speed, voltage=volts, pose=None, twist=None, current=None), robot)
+    assert [finding.severity for finding in verdict.of("equal")] == ["error"] * 3
+    assert {finding.numbers["reason"] for finding in verdict.of("equal")} == {"voltage"}
+
+
 def test_a_clean_log_has_no_copies(log, robot):
     assert not check(log, robot).of("equal")

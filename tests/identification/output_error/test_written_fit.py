@@ -6,6 +6,7 @@ import pytest
 import omnidyn
 from omnidyn import OutputError
 from omnidyn.identification.output_error.linear.free_run import FreeRun
+from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import Key
 from tests.support import plain_robot
 
@@ -44,6 +45,15 @@ def test_a_latency_does_not_stand_in_for_wheel_radius_and_inertia(late):
     assert blocks.given > 5.0 * blocks.written
     assert "size_fitted" in codes(result)
     assert "late_by_rows" not in codes(result)
+
+
+def test_no_wheel_is_a_tenth_of_what_its_file_says(tmp_path):
+    """A robot without the forces of a turning frame, that its file has: what fits best then is no wheel."""
+    wheels = plain_robot.robot(tmp_path).wheels
+    guess = first_guess("new", wheels, plain_robot.MASS, 6.0, shape="axes")
+    result = omnidyn.identify(plain_robot.log(5, late_rows=2, dead_band=0.5), guess, quick=True)
+    assert "size_fitted" not in codes(result)
+    assert "wheels.wheel_radius_m" not in result.value
 
 
 def test_what_was_asked_for_by_name_is_kept_and_doubted(late):

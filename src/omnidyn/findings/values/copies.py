@@ -9,7 +9,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
-from omnidyn.findings.signal.reference import expected_wheel_speed
+from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
 from omnidyn.findings.signal.robust import quantum, rest_level, white_noise
 from omnidyn.logs.channels import components
 from omnidyn.sensors import COUNTED, SENSORS
@@ -28,18 +28,18 @@ def check_copies(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
 
     A note where nothing says that they should differ: wheels of a simulated robot that drives straight turn alike.
     """
-    findings: list[Finding] = []
+    findings, original = list[Finding](), work  # pairs are judged by all that was logged, not by what one before left
     if len(work) < MIN_ROWS:
         return findings, work
     for channel in MEASURED:
-        values = work.get(channel)
+        values = original.get(channel)
         if values is None or (channel == "wheel_speed" and work.derived_speed):
             continue
         names = components(channel, values.shape[1])
         for j, k in combinations(range(values.shape[1]), 2):
             if not _are_equal(values[:, j], values[:, k]):
                 continue
-            reason = _reason(work, channel, j, k)
+            reason = _reason(original, channel, j, k)
             numbers = {"reason": reason}
             findings.append(Finding("equal", ERROR if reason else NOTE, f"{names[j]} {names[k]}", numbers))
             for masked in (channel, "wheel_speed") if reason and work.derived_speed else (channel,) * bool(reason):
@@ -55,16 +55,37 @@ def _are_equal(one: FloatArray, other: FloatArray) -> bool:
     )
 
 
+def _are_all_equal(values: FloatArray) -> bool:
+    """Whether all components are, as those of a robot that turns in place."""
+    return all(_are_equal(values[:, 0], values[:, k]) for k in range(1, values.shape[1]))
+
+
+def _drive_apart(inputs: FloatArray, j: int, k: int, alike: bool) -> bool:
+    """Whether inputs differ, and should turn two wheels apart. alike: whether all wheels turned alike.
+
+    Inputs that have more in common than they differ by turn a robot in place, where friction holds it against the rest.
+    """
+    if not _differ(inputs, j, k):
+        return False
+    common = np.nanmean(inputs, axis=1, keepdims=True)
+    return not alike or bool(np.nansum((inputs - common) ** 2) > np.nansum(common**2) * inputs.shape[1])
+
+
 def _reason(work: LogUnderCheck, channel: str, j: int, k: int) -> str:
     """Why two components cannot be equal, a reason of `telling`; "" where they may."""
     if channel != "twist":
-        speed = work.get("wheel_speed")
+        speed, alike = work.get("wheel_speed"), _are_all_equal(work.channels[channel])
         for name in ("voltage", "duty", "wheel_speed_command"):
             inputs = work.get(name)
-            if inputs is not None and _differ(inputs[_turning(speed, j, len(inputs))], j, k):
+            if inputs is not None and _drive_apart(inputs[_turning(speed, j, len(inputs))], j, k, alike):
                 return name
         expected = expected_wheel_speed(work, without="wheel_speed") if channel != "current" else None
-        if expected is not None and _differ(expected[1], j, k) and _beyond_noise(expected[1], speed, j, k):
+        is_measured = expected is not None and expected[0] in MEASUREMENTS
+        if (
+            expected is not None
+            and _drive_apart(expected[1], j, k, alike and not is_measured)
+            and _beyond_noise(expected[1], speed, j, k)
+        ):
             return expected[0]
     values = work.channels[channel][:, j]
     largest = float(np.nanmax(np.abs(values)))

@@ -368,13 +368,16 @@ class Fit:
 
     def beside(
         self,
-        base_solution: Solution,
+        base_solution: Solution | None,
         nuisances: Sequence[str],
         progress: FitProgress,
         limit: int = MAX_ITERATIONS,
     ) -> Solution:
-        """The fit of the only group with these nuisances, in the rows of another fit. limit: of its steps."""
-        problem = replace(self.groups[0].problem(nuisances), pieces=base_solution.solver.problem.pieces)
+        """The fit of the only group with these nuisances, in the rows of another fit and from its end; or from a start
+        of its own. limit: of its steps."""
+        problem = self.groups[0].problem(nuisances)
+        if base_solution is not None:
+            problem = replace(problem, pieces=base_solution.solver.problem.pieces)
         return self._solve(self.groups[0], problem, progress, base_solution, limit)
 
     def _with_latencies_only(self, solution: Solution, progress: FitProgress) -> Solution | None:

@@ -111,7 +111,10 @@ def with_dead_band(
     begun_fit = beside(solution, [*names, DEAD_BAND], inner_progress, limit=0)
     if not gains_much(begun_fit):
         return chosen_solution
-    return best_with(chosen_solution, [begun_fit.gone_on(inner_progress)], (DEAD_BAND,), "driver_dead_band")
+    fitted = beside(
+        None, [*names, DEAD_BAND], inner_progress
+    )  # from a start of its own: without it, all went elsewhere
+    return best_with(chosen_solution, [fitted], (DEAD_BAND,), "driver_dead_band")
 
 
 def gains_much(begun_fit: Solution) -> bool:

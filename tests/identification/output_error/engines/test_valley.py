@@ -48,6 +48,26 @@ def test_a_bent_step_changes_push_and_braking_by_what_their_slopes_say(problem):
     assert np.abs(bent - step).max() < 0.5 * np.abs(step).max()
 
 
+def test_a_bent_step_changes_what_is_moved_by_what_its_slope_says():
+    """M + 1.5 l^2 J/r^2 along x: a longer gear with lighter rotors and magnets moves the same way."""
+    wheels = load_robot("axebot").wheels
+    robot = first_guess("new", wheels, 1.5)
+    rng = np.random.default_rng(0)
+    log = Run(t=0.01 * np.arange(60), voltage=rng.normal(size=(60, 3)), wheel_speed=rng.normal(size=(60, 3)))
+    free = ("motor.gear_ratio", "motor.torque_constant_Nm_A", "motor.rotor_inertia_kg_m2")
+    question = OutputError(free=free, nuisances=())
+    problem = make_problem(read_records([log], robot, question), robot, question)
+    inner = np.array([p.inner(p.value) for p in problem.parameters])
+    step = np.array([0.1, -0.1, -0.2 * robot.motor.rotor_inertia])
+
+    def added(numbers):
+        motor = problem.robot_at([p.outer(z) for p, z in zip(problem.parameters, numbers, strict=True)]).motor
+        return 1.5 * motor.gear_ratio**2 * motor.rotor_inertia / wheels.wheel_radius**2
+
+    assert abs(added(inner + step) / added(inner) - 1.0) > 0.02  # the second order of a straight step
+    assert added(inner + ImplicitEngine(problem).bent(inner, step)) == pytest.approx(added(inner), rel=1e-3)
+
+
 def test_a_step_of_one_number_goes_where_it_says(problem):
     """Nothing else moves."""
     inner = np.array([p.inner(p.value) for p in problem.parameters])

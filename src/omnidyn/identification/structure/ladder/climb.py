@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.identification.lack_of_fit import CHANGE, LOSS, LackOfFit, Remedy
+from omnidyn.identification.lack_of_fit import LOSS, OF_LOGS, LackOfFit, Remedy
 from omnidyn.identification.ladder import STANDS, Ladder, Rung
 from omnidyn.identification.output_error.begin import ALL_LOGS
 from omnidyn.identification.output_error.conclusion import unexplained
@@ -151,7 +151,7 @@ def offered(lack: LackOfFit) -> list[Remedy]:
     """The remedies that are worth a fit, best first: those that a robot file or a fit can hold, and nothing else is the
     same as; and what the first of them cannot be told from."""
     usable_remedies = simpler_first(
-        [r for r in lack.remedies if r.offered and r.key not in (CHANGE, LOSS) and not r.rivals]
+        [r for r in lack.remedies if r.offered and r.key not in (*OF_LOGS, LOSS) and not r.rivals]
     )
     rival_remedies = [r for r in usable_remedies[TRIED_REMEDIES:] if r.key in usable_remedies[0].same_as]
     return [*usable_remedies[:TRIED_REMEDIES], *rival_remedies[: TRIED_REMEDIES - 1]]
@@ -391,7 +391,7 @@ def _beyond(model: Model, examinations: Mapping[str, Examined]) -> tuple[float, 
 
 def _beyond_one(examination: Examined) -> tuple[float, Statement | None]:
     lack = examination.diagnosis.lack_of_fit
-    unusable_remedies = [r for r in lack.remedies if not r.offered or r.key == CHANGE]
+    unusable_remedies = [r for r in lack.remedies if not r.offered or r.key in OF_LOGS]
     gains_and_causes = [(r.chi2 - np.log(max(examination.rows, 2)) * r.numbers, r.cause) for r in unusable_remedies]
     return max(gains_and_causes, key=lambda pair: pair[0], default=(-np.inf, None))
 
@@ -409,7 +409,7 @@ def _looks_like(lack: LackOfFit) -> Statement | None:
     first = next(iter(lack.causes), None)
     if first is None:
         return None
-    if first.key == CHANGE:
+    if first.key in OF_LOGS:
         return Statement("looks_like_change", NOTE, numbers={"cause": first.cause})
     if not first.offered:
         return Statement("looks_like", NOTE, numbers={"causes": (first.cause,)})

@@ -6,7 +6,7 @@ several where none is small (a limit, a time). A new law comes in here with one 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -15,10 +15,11 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
-from omnidyn.identification.lack_of_fit import CHANGE
+from omnidyn.identification.lack_of_fit import CHANGE, ONE_LOG
 from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion, in_the_room
 from omnidyn.identification.output_error.linear.workbench import Workbench, scaled
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
+from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN, Driver
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.keys import EMF, TORQUE
@@ -29,6 +30,7 @@ from omnidyn.statement import NOTE, Statement
 LEAST_CHANGE = -0.9  # relative change of a number that is above 0: what goes further is no explanation
 STEP = 0.02  # relative change that a smooth number is tried with
 CHANGE_SHARES = np.linspace(0.1, 0.9, 9)  # shares of the run at which it may change
+MOST_LOGS = 12  # of which each is tried as the one that differs
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,7 @@ def _number(robot: Robot, key: str, tied_key: str = "") -> Iterator[Candidate]:
 
 
 def of_the_log(bench: Workbench) -> Iterator[Candidate]:
-    """What a log does to a right model: nuisances that are not fitted, and a change on the way."""
+    """What a log does to a right model: nuisances that are not fitted, a change on the way, one log unlike others."""
     if not bench.kind.has_loop:
         gain, fade, band = Driver(gain=1.0 + STEP), Driver(fade=STEP), Driver(dead_band=0.1)
         yield Candidate(GAIN, _driver(GAIN, gain, STEP), sized("gain", "", gain=lambda change, _: 1.0 + change))
@@ -142,6 +144,29 @@ def of_the_log(bench: Workbench) -> Iterator[Candidate]:
             at=lambda _, share: time_of(share),
         )
         yield Candidate(CHANGE, _later(force), cause_of_change)
+    yield from _unlike_others(bench, mass)
+
+
+def _unlike_others(bench: Workbench, mass: float) -> Iterator[Candidate]:
+    """One of several logs, unlike the others. Of two logs it is the second: what differs in the first says the same."""
+    records = list({id(piece.record): piece.record for piece in bench.problem.pieces}.values())
+    names = [record.source or f"log {k + 1}" for k, record in enumerate(records)]
+    if not 1 < len(records) <= MOST_LOGS:
+        return
+    first = int(len(records) == 2)
+    for subject, force, whole in (
+        ("mass", _inertia, mass),
+        ("friction", _dry_friction, np.inf),
+        ("supply", _drive, 1.0),
+    ):
+        cause_in_log = sized(
+            "differs_in_one_log",
+            subject,
+            share=lambda change, _, whole=whole: max(change / whole, -1.0),
+            log=lambda _, place: names[first + int(place)],
+            other=lambda *_: names[0] if len(names) == 2 else "",
+        )
+        yield Candidate(ONE_LOG[subject], _in_one_log(force, records[first:]), cause_in_log)
 
 
 def _driver(name: str, driver: Driver, size: float) -> Callable[[Workbench], list[Trial]]:
@@ -185,6 +210,20 @@ def _later(force: Callable[[DrivenMotion], FloatArray]) -> Callable[[Workbench],
     return trials
 
 
+def _in_one_log(
+    force: Callable[[DrivenMotion], FloatArray], records: Sequence[Record]
+) -> Callable[[Workbench], list[Trial]]:
+    """Forces in one log alone, in each of some. at: which of them."""
+
+    def trials(bench: Workbench) -> list[Trial]:
+        columns_by_log = bench.by_forces(
+            [lambda m, record=record: force(m) * (m.piece.record is record) for record in records]
+        )
+        return [Trial(columns, float(k)) for k, columns in enumerate(columns_by_log)]
+
+    return trials
+
+
 def _seconds(bench: Workbench, share: float) -> float | None:
     """A moment of the logs [s]; None where they are not as long as each other."""
     spans = [piece.record.span for piece in bench.problem.pieces]
@@ -194,6 +233,11 @@ def _seconds(bench: Workbench, share: float) -> float | None:
 def _friction(motion: DrivenMotion) -> FloatArray:
     speed = motion.twist[:, None, :]
     return -np.concatenate([np.eye(N_AXES) * np.sign(speed), np.eye(N_AXES) * speed], axis=1)
+
+
+def _dry_friction(motion: DrivenMotion) -> FloatArray:
+    """Its level on each axis, which is what another floor changes: viscous friction stands in for a supply."""
+    return _friction(motion)[:, :N_AXES]
 
 
 def _inertia(motion: DrivenMotion) -> FloatArray:

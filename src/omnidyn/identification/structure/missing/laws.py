@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
+from omnidyn.identification.lack_of_fit import OF_LOGS
 from omnidyn.identification.output_error.linear.driven_motion import DrivenMotion
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.structure.missing.candidates import (
-    CHANGE,
     STEP,
     Candidate,
     Trial,
@@ -58,7 +58,7 @@ def candidates(bench: Workbench) -> Iterator[Candidate]:
     of_laws = (*_of_the_body(bench), *_of_motors(bench), *_of_friction(bench))
     for candidate in (*numbers(bench), *of_laws, *of_the_log(bench)):
         key = find_key(candidate.key)
-        if candidate.key == CHANGE or not (candidate.key in free_names or (key and key.name in free_names)):
+        if candidate.key in OF_LOGS or not (candidate.key in free_names or (key and key.name in free_names)):
             yield candidate
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
-from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.lack_of_fit import OF_LOGS, Remedy
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.engine import FitEngine
 from omnidyn.identification.output_error.engines.kinds import Kind, kind_with
@@ -28,7 +28,7 @@ from omnidyn.identification.output_error.prepare import (
 from omnidyn.identification.output_error.problem.nuisances import PUSH
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
-from omnidyn.identification.structure.missing.candidates import CHANGE, Candidate, FittedCandidate, Trial
+from omnidyn.identification.structure.missing.candidates import Candidate, FittedCandidate, Trial
 from omnidyn.identification.structure.missing.switches import Switch, as_fitted, simpler_first, switches
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 
@@ -98,7 +98,7 @@ def _asked(ranking: Sequence[Remedy], candidates: Sequence[Candidate]) -> Iterat
     """What to fit: the best that a robot file or a fit can hold, a constant push and every shape: far from the best fit
     with them, columns near the one without tell little."""
     candidate_by_key = {candidate.key: candidate for candidate in candidates}
-    best = simpler_first([remedy for remedy in ranking if remedy.offered and remedy.key != CHANGE])[:BEST]
+    best = simpler_first([remedy for remedy in ranking if remedy.offered and remedy.key not in OF_LOGS])[:BEST]
     yield from ((candidate_by_key[remedy.key], remedy) for remedy in best)
     for key in ALWAYS_TRIED:
         if key in candidate_by_key and key not in {remedy.key for remedy in best}:
