@@ -289,4 +289,4 @@ def _holds_zero(ends: tuple[float, float]) -> bool:
 def named(sources: Sequence[str]) -> str:
     """Some logs in a few words."""
     names = list(dict.fromkeys(sources))
-    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more log{'s'[: len(names) - 2]}"
+    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more log{'s' if len(names) > 2 else ''}"

@@ -424,5 +424,5 @@ def _unit(name: str) -> str:
 def _data(records: Sequence[Record]) -> str:
     rows = sum(last - first + 1 for r in records for first, last in r.pieces)
     first = records[0].source or "unnamed"
-    more = f" and {len(records) - 1} more log{'s'[: len(records) - 2]}" if len(records) > 1 else ""
+    more = f" and {len(records) - 1} more log{'s' if len(records) > 2 else ''}" if len(records) > 1 else ""
     return f"{first}{more}, {rows} rows"
