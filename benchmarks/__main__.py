@@ -15,7 +15,7 @@ NAMES = {
     # the root, and folders of one benchmark
     "house": "the house in figures: lines, files per folder, parameter lists, what stands twice, circles",
     "mutants": "tests of tests: small changes drawn in six rooms, and how many their tests see (40 minutes)",
-    "coverage": "lines of every folder that the tests nearest to it run, each for 300 s at most (an hour)",
+    "coverage": "lines of every folder that its own tests and all tests run (an hour)",
     "batch": "many robots at once beside a C++ loop, NumPy, JAX, MuJoCo; poses, implicit blocks, a million (5 minutes)",
     "control_real": "closed loops on an independent plant with real sensors, beside hand PID and LQR (a minute)",
     "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",

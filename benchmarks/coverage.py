@@ -1,14 +1,14 @@
-"""Lines of the code that the tests nearest to it run, folder by folder.
+"""Lines of the code that the tests run, folder by folder: by the tests nearest to it, and by all tests.
 
-The tests of src/omnidyn/NAME stand in tests/NAME. They run in an order drawn at random, in a process of their own, for
-so long and no longer; one that takes long is stopped, and what it ran until then counts. So the figures are bounds from
-below. Kernels of PLAIN folders run as plain Python; those of others are compiled, and left out of the count.
-What runs in a process that a test starts is not seen. Needs the package coverage, which is in no lock:
+The tests of src/omnidyn/NAME stand in tests/NAME. Each folder of tests runs whole, without --long, in a process of its
+own; what it starts in further processes counts too. Kernels that numba compiles cannot be seen and are left out of the
+count: what their tests are worth is measured by benchmarks/mutants.py. Needs the package coverage, which is in no lock:
 
     .venv/bin/python -m pip install --target /tmp/coverage coverage==7.17.5
-    PYTHONPATH=src:.:/tmp/coverage .venv/bin/python -m benchmarks.coverage [NAME ...] [--missing]
+    PYTHONPATH=src:.:/tmp/coverage .venv/bin/python -m benchmarks.coverage [--missing] [--keep FOLDER]
 
-measures all folders or some; --missing shows the lines left over.
+--missing shows the lines left over; what ran is kept in FOLDER, and a folder of tests whose lines are there already is
+not run again. All tests take three quarters of an hour on one processor.
 """
 
 from __future__ import annotations
@@ -17,10 +17,8 @@ import argparse
 import ast
 import importlib
 import importlib.util
-import json
 import os
-import random
-import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -29,48 +27,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.size import SHARE
 from benchmarks.table import Table, machine
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "omnidyn"
-PLAIN = ("model", "simulation")  # their kernels run as plain Python
 KERNELS = ("part", "kernel", "maker", "branching_kernel")  # what makes a function of compiled/kernel.py
-TEST_S = {True: 3.0, False: 15.0}  # [s] of processor time for a test, where kernels are plain and where not
-FOLDER_S = 300.0  # for all tests of a folder
-GOAL = 90.0  # %
-SEED = 1
-
-
-class TooLongError(BaseException):
-    """A test has had its time; no `except Exception` of it may go on."""
-
-
-class Stopwatch:
-    """A plugin of pytest: tests in random order, each for `test_s` of processor time, all for `folder_s`."""
-
-    def __init__(self, test_s: float, folder_s: float) -> None:
-        self.test_s, self.folder_s = test_s, folder_s
-        self.ran, self.all = 0, 0
-
-    def pytest_collection_modifyitems(self, items: list[Any]) -> None:
-        """Put them into a random order."""
-        random.Random(SEED).shuffle(items)
-        self.all = len(items)
-
-    def pytest_runtest_logstart(self) -> None:
-        """Start the time of a test, its fixtures included."""
-        self.ran += 1
-        signal.setitimer(signal.ITIMER_PROF, self.test_s)
-
-    def pytest_runtest_logfinish(self) -> None:
-        """Stop it."""
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-
-    def pytest_runtest_protocol(self, item: Any) -> None:
-        """No test begins late."""
-        if time.process_time() > self.folder_s:
-            item.session.shouldstop = "the folder has had its time"
+GOAL = 90.0  # % of the lines of a folder, by all tests
+TOP = "top"  # files that lie in no folder, and the tests of them
+START = "import coverage; coverage.process_startup()\n"  # what each process of Python runs first
 
 
 def kernel_lines(text: str) -> set[int]:
@@ -83,92 +47,86 @@ def kernel_lines(text: str) -> set[int]:
     return lines
 
 
-def run_tests(name: str, answer: Path) -> None:
-    """In a process of its own: the tests of a folder; into `answer` what ran, as JSON."""
-    plain = name in PLAIN
-    os.environ["NUMBA_DISABLE_JIT"] = str(int(plain))
-    coverage = importlib.import_module("coverage")
-    measured = coverage.Coverage(source=[str(PACKAGE / name)], data_file=None, config_file=False)
-
-    def stop(*_: object) -> None:
-        raise TooLongError
-
-    signal.signal(signal.SIGPROF, stop)
-    watch = Stopwatch(TEST_S[plain], FOLDER_S * SHARE)
-    measured.start()
-    importlib.import_module("pytest").main(
-        ["-n0", "-q", "-p", "no:cacheprovider", "--tb=no", f"tests/{name}"], plugins=[watch]
+def run_tests(name: str, kept: Path) -> None:
+    """Run tests/NAME; each process writes the lines that it ran into a file of its own in kept/NAME."""
+    unfinished, finished = kept / f"{name}.unfinished", kept / name
+    unfinished.mkdir(parents=True, exist_ok=True)
+    (unfinished / "sitecustomize.py").write_text(START, "utf-8")
+    (unfinished / "settings").write_text(
+        f"[run]\nsource = {PACKAGE}\ndata_file = {unfinished}/lines\nparallel = True\nsigterm = True\n", "utf-8"
     )
-    measured.stop()
-    files = {}
-    for path in sorted((PACKAGE / name).rglob("*.py")):
-        _, statements, _, missing, _ = measured.analysis2(str(path))
-        left_out = set() if plain else kernel_lines(path.read_text("utf-8"))
-        files[path.relative_to(PACKAGE).as_posix()] = [
-            [line for line in lines if line not in left_out] for lines in (statements, missing)
-        ]
-    answer.write_text(json.dumps({"ran": watch.ran, "all": watch.all, "files": files}), "utf-8")
+    path = os.pathsep.join([str(unfinished), *filter(None, [os.environ.get("PYTHONPATH")])])
+    tests = [f"tests/{name}"] if name != TOP else sorted(map(str, (ROOT / "tests").glob("test_*.py")))
+    pytest = ["-m", "pytest", "-n0", "-q", "-p", "no:cacheprovider", "--tb=no", *tests]
+    subprocess.run(
+        [sys.executable, *pytest],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": path, "COVERAGE_PROCESS_START": str(unfinished / "settings")},
+        stdin=subprocess.DEVNULL,
+        stdout=(kept / f"{name}.txt").open("w", encoding="utf-8"),
+        stderr=subprocess.STDOUT,
+        check=False,
+    )
+    unfinished.rename(finished)
 
 
-def of_folder(name: str) -> tuple[dict[str, Any], float]:
-    """What `run_tests` found, and its processor time [s]."""
-    with tempfile.TemporaryDirectory() as folder:
-        answer = Path(folder) / "answer.json"
-        child = os.fork()
-        if child == 0:
-            code = 1
-            try:
-                os.chdir(ROOT)
-                silence = os.open(os.devnull, os.O_WRONLY)
-                os.dup2(silence, 1)
-                run_tests(name, answer)
-                code = 0
-            finally:
-                os._exit(code)
-        _, _, used = os.wait4(child, 0)
-        return json.loads(answer.read_text("utf-8")), used.ru_utime + used.ru_stime
+def combined(folders: list[Path], file: Path) -> Any:
+    """What any process of these folders of tests ran; it is combined in `file`."""
+    coverage = importlib.import_module("coverage").Coverage(data_file=str(file), config_file=False)
+    coverage.combine([str(path) for folder in folders for path in folder.glob("lines.*")], keep=True)
+    return coverage
 
 
-def measure(
-    names: list[str] | None = None, missing: bool = False, hear: Callable[[str], None] = lambda words: None
-) -> Table:
-    """A row for every folder, and for every folder in it."""
-    columns = ["folder", "lines", "run", "%", "tests", "of", "cpu s"]
-    table = Table("coverage: lines that the nearest tests run", columns)
+def measure(missing: bool = False, kept: Path | None = None, hear: Callable[[str], None] = lambda words: None) -> Table:
+    """A row for every folder of src/omnidyn, and for every folder in it."""
+    table = Table("coverage: lines that the tests run", ["folder", "lines", "% nearest", "% all", "cpu s"])
     if importlib.util.find_spec("coverage") is None:
         table.notes.append("skipped: the package coverage is not installed here; see benchmarks/coverage.py")
         return table
-    tests = {path.name for path in (ROOT / "tests").iterdir() if path.is_dir()}
-    for name in names or sorted(path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name in tests):
-        found, seconds = of_folder(name)
-        counts: dict[str, list[int]] = defaultdict(lambda: [0, 0])
-        for file, (statements, left) in found["files"].items():
-            for folder in {name, "/".join(file.split("/")[:-1][:2])}:
-                counts[folder][0] += len(statements)
-                counts[folder][1] += len(statements) - len(left)
+    kept = kept or Path(tempfile.mkdtemp(prefix="omnidyn-coverage-"))
+    seconds: dict[str, float] = {}
+    names = [TOP, *sorted(path.name for path in (ROOT / "tests").iterdir() if next(path.glob("**/test_*.py"), None))]
+    for name in names:
+        if not (kept / name).is_dir():
+            begun = sum(os.times()[2:4])
+            run_tests(name, kept)
+            seconds[name] = sum(os.times()[2:4]) - begun
+        hear(f"tests/{name}: {(kept / f'{name}.txt').read_text('utf-8').strip().splitlines()[-1]}")
+    with tempfile.TemporaryDirectory() as folder:
+        ran_by = {name: combined([kept / name], Path(folder) / name) for name in names}
+        by_all = combined([kept / name for name in names], Path(folder) / "all")
+        counts: dict[str, list[int]] = defaultdict(lambda: [0, 0, 0])
+        for path in sorted(PACKAGE.rglob("*.py")):
+            parts = path.relative_to(PACKAGE).parts[:-1] or (TOP,)
+            kernels = kernel_lines(path.read_text("utf-8"))
+            _, lines, _, left, _ = by_all.analysis2(str(path))
+            left_near = ran_by[parts[0]].analysis2(str(path))[3] if parts[0] in ran_by else lines
+            lines, left, left_near = (set(each) - kernels for each in (lines, left, left_near))
             if missing and left:
-                hear(f"{file}: {' '.join(map(str, left))}")
-        for folder, (lines, ran) in sorted(counts.items()):
-            if lines:
-                share = 100.0 * ran / lines
-                whole = {"tests": found["ran"], "of": found["all"], "cpu s": round(seconds)} if folder == name else {}
-                was_cut = found["ran"] < found["all"]  # then what is missing says nothing
-                met = None if was_cut and share < GOAL else share >= GOAL
-                goal = {"goal": f">= {GOAL:g} %", "met": met} if folder == name else {}
-                table.add(folder=folder, lines=lines, run=ran, **{"%": round(share)}, **whole, **goal)
-        lines, ran = counts[name]
-        hear(f"{name}: {ran} of {lines} lines, {found['ran']} of {found['all']} tests, {seconds:.0f} s")
-    table.notes.append(f"{', '.join(PLAIN)}: kernels as plain Python; elsewhere kernels are compiled and not counted")
-    table.notes.append(machine())
+                hear(f"{path.relative_to(PACKAGE).as_posix()}: {' '.join(map(str, sorted(left)))}")
+            for each in {parts[0], "/".join(parts[:2])}:
+                for place, found in enumerate((lines, lines - left_near, lines - left)):
+                    counts[each][place] += len(found)
+    for each, (lines, near, anywhere) in sorted(counts.items()):
+        if lines:
+            cells = {"% nearest": round(100.0 * near / lines), "% all": round(100.0 * anywhere / lines)}
+            cells |= {"cpu s": round(seconds[each])} if each in seconds else {}
+            goal = {"goal": f">= {GOAL:g} %", "met": 100.0 * anywhere / lines >= GOAL} if "/" not in each else {}
+            table.add(folder=each, lines=lines, **cells, **goal)
+    table.notes.append("kernels are compiled and not counted; tests in the browser and those marked long are not run")
+    table.notes.append(f"{machine()}; coverage {importlib.import_module('coverage').__version__}")
     return table
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help="folders of src/omnidyn; by default all")
     parser.add_argument("--missing", action="store_true", help="show the lines that did not run")
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep what ran in FOLDER, and go on from there")
     options = parser.parse_args()
-    print(measure(options.names, options.missing, lambda words: print(words, flush=True)).as_text())
+    begun = time.monotonic()
+    table = measure(options.missing, options.keep, lambda words: print(words, flush=True))
+    print(table.as_text())
+    print(f"{time.monotonic() - begun:.0f} s")
     return 0
 
 
