@@ -8,7 +8,7 @@ from functools import cache
 
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import Diagnosis
-from omnidyn.identification.output_error.answer import Answer
+from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear.free_run import free_run, margins_of
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
@@ -141,6 +141,7 @@ def answered(fit: Fit, solution: Solution, progress: FitProgress, quick: bool = 
     """What a solution says, each estimate with its diagnosis, which is made when it is first asked for; `quick` leaves
     it out."""
     answer = fit.answer(solution, progress)
+    answer = replace(answer, estimates={group: as_answered(estimate) for group, estimate in answer.estimates.items()})
     if quick:
         return answer
     studied_estimates = {
@@ -148,6 +149,21 @@ def answered(fit: Fit, solution: Solution, progress: FitProgress, quick: bool = 
         for (group, estimate), group_solution in zip(answer.estimates.items(), answer.solutions, strict=True)
     }
     return replace(answer, estimates=studied_estimates)
+
+
+def as_answered(estimate: OutputErrorEstimate) -> OutputErrorEstimate:
+    """The estimate with its own latencies in what is said of them: weighed, they may be others than those judged."""
+    warnings = []
+    for statement in estimate.warnings:
+        if statement.code == "late_by_rows":
+            nuisance, numbers = estimate.nuisances.get(f"{LATENCY}.{statement.subject}"), dict(statement.numbers)
+            latency = 0.0 if nuisance is None else nuisance.value
+            rows = numbers["rows"] * latency / numbers["latency"]
+            if rows <= LATE_ROWS:
+                continue
+            statement = replace(statement, numbers=numbers | {"latency": latency, "rows": rows})
+        warnings.append(statement)
+    return replace(estimate, warnings=tuple(warnings))
 
 
 def _study(solution: Solution) -> Callable[[], Diagnosis]:

@@ -1,11 +1,14 @@
 """Which fit is written: by free runs on held-out blocks, of logs that plain NumPy made."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import omnidyn
 from omnidyn import OutputError
 from omnidyn.identification.output_error.linear.free_run import FreeRun
+from omnidyn.identification.whole_logs import as_answered
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import Key
 from tests.support import plain_robot
@@ -63,6 +66,25 @@ def test_what_was_asked_for_by_name_is_kept_and_doubted(late):
     (late_by,) = (warning for warning in result.warnings if warning.code == "late_by_rows")
     assert late_by.numbers["without"] > 1.5 * late_by.numbers["error"] > 0.0
     assert "by the best fit without it" in str(late_by)
+
+
+def test_a_latency_is_said_as_the_table_has_it(late):
+    """What judges a latency is a fit before its errors are weighed; what is said of it is of the answer."""
+    given, log = late
+    estimate = omnidyn.identify(log, given, OutputError(free="friction"), quick=True).estimate
+    (late_by,) = (warning for warning in estimate.warnings if warning.code == "late_by_rows")
+    name = f"latency.{late_by.subject}"
+    assert late_by.numbers["latency"] == estimate.nuisances[name].value
+    other = replace(estimate.nuisances[name], value=1.25 * estimate.nuisances[name].value)
+    (again,) = (
+        warning
+        for warning in as_answered(replace(estimate, nuisances={name: other})).warnings
+        if warning.code == "late_by_rows"
+    )
+    assert again.numbers["latency"] == other.value
+    assert again.numbers["rows"] == pytest.approx(1.25 * late_by.numbers["rows"])
+    none = replace(other, value=1e-3)
+    assert "late_by_rows" not in {each.code for each in as_answered(replace(estimate, nuisances={name: none})).warnings}
 
 
 def test_errors_that_remember_give_way_to_least_squares_that_predict_better(late):
