@@ -54,6 +54,7 @@ def figures(package: Path) -> dict[str, str]:
     every = imports(package)
     found = circles(every)
     by_path = {path: ast.parse("\n".join(lines)) for path, lines in texts.items()}
+    by_name = {path.relative_to(package).as_posix(): tree for path, tree in by_path.items()}
     trees = [*by_path.values()]
     fits = [tree for path, tree in by_path.items() if path.relative_to(package).parts[0] == "identification"]
     return {
@@ -79,7 +80,7 @@ def figures(package: Path) -> dict[str, str]:
         "classes of identification": f"{sum(map(class_count, fits))}",
         "constants of identification": f"{sum(map(constant_count, fits))}",
         "files of identification with a rule of selection": f"{sum(map(has_rule, texts.items()))}",
-        "files naming an engine of another": f"{len(named_outside(package))}",
+        "files naming an engine of another": f"{len(named_outside(by_name))}",
         "files naming wheel_angle": f"{sum('wheel_angle' in ' '.join(lines) for lines in texts.values())}",
         f"pairs of blocks of {RUN} lines that stand twice": f"{twice}",
         "circles between files or folders": f"{len(found)}",

@@ -54,7 +54,7 @@ def test_the_file_keeps_the_map_and_its_errors():
         ),
         ([(1.0, 2.0), (2.0, 2.0)], "not monotone"),
         ([(1.0, 0.0)], "not monotone"),
-        ([(1.0,)], "at least 2 items"),
+        ([(1.0,)], "at least 2 values"),
     ],
 )
 def test_what_is_no_map(points, words):
