@@ -105,6 +105,7 @@ class Live:
 
     def _ask(self, has_loop: bool) -> None:
         """Settle what is fitted. has_loop: the rows have set speeds and no voltages."""
+        self._has_loop = has_loop
         self.method = self._asked or _default_method(self.robot, self.reference is not None, has_loop)
         self._fitted = _fitted(self.robot, self.method)
         self._within = _shares(self._asked_within, self._fitted, self.method)
@@ -214,7 +215,7 @@ class Live:
         """Fit the last rows anew, and all others at what comes out; where they tell nothing, what was before stays."""
         run = self._rows.between(-math.inf, now)
         assert run is not None
-        has_loop = self.robot.drive.kind == SPEED and run.voltage is None and run.duty is None
+        has_loop = self._has_loop or (self._model is not None and self._model.has_loop)
         last = run if has_loop else part(run, max(len(run) - FIT_ROWS, 0), len(run))
         try:
             model = LiveModel(last, self.robot, self.method)
